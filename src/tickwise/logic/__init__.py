@@ -1,0 +1,1 @@
+"""MITL_f formulas: syntax, parsing, printing, semantics, normal form and structure."""
