@@ -1,0 +1,1 @@
+"""Timed automata: from formulas in SDNF to tables that a learner steps through."""

@@ -1,0 +1,108 @@
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from tests.automata.twins import CASE_STUDY, one
+from tests.strategies import predicates, sequential_conjunctions
+from tickwise.automata.build import build
+from tickwise.automata.mapping import bijections
+from tickwise.automata.model import Edge, TimedAutomaton
+from tickwise.errors import AutomatonError
+from tickwise.logic.sdnf import Primitive, SequentialConjunction
+from tickwise.logic.syntax import Interval
+
+
+def operators(conjunction: SequentialConjunction) -> list[str]:
+    return [primitive.operator.value for primitive in conjunction.primitives]
+
+
+@st.composite
+def equivalents(draw: st.DrawFn, conjunction: SequentialConjunction) -> SequentialConjunction:
+    """A structurally equivalent conjunction (Definition 6) with other numbers and predicates."""
+    parts, earliest = [], 0
+    for primitive in conjunction.primitives:
+        start = earliest + draw(st.integers(0, 4))
+        window = Interval(start, start + draw(st.integers(0, 4)))
+        duration = draw(st.integers(1, 4)) if primitive.operator.nested else 0
+        parts.append(Primitive(primitive.operator, window, duration, draw(predicates())))
+        earliest = parts[-1].end + 1
+    return SequentialConjunction(tuple(parts))
+
+
+def images(automaton: TimedAutomaton, letters, locations, clocks) -> set[tuple[object, ...]]:
+    """The edges as (ξ_Q(q), ξ_Σ(σ), ξ_Q(q'), compared clocks, ξ_C[r]), one for each letter."""
+    return {
+        (
+            int(locations[edge.source]),
+            int(letters[letter]),
+            int(locations[edge.target]),
+            frozenset((int(clocks[atom.clock]), atom.comparison) for atom in edge.guard),
+            frozenset(int(clocks[clock]) for clock in edge.resets),
+        )
+        for edge in automaton.edges
+        for letter in automaton.letters(edge)
+    }
+
+
+@settings(max_examples=200)
+@given(st.data())
+def test_the_bijections_preserve_the_structure(data):
+    conjunction = data.draw(sequential_conjunctions())
+    target, source = build(data.draw(equivalents(conjunction))), build(conjunction)
+    xi = bijections(target, source)
+    for found, size in (
+        (xi.letters, 2 ** len(source.predicates)),
+        (xi.locations, len(source.locations)),
+        (xi.clocks, len(source.clocks)),
+    ):
+        assert sorted(found.tolist()) == list(range(size))
+        with pytest.raises(ValueError, match="read-only"):
+            found[0] = 1
+    assert xi.locations[target.initial] == source.initial
+    assert set(xi.locations[sorted(target.accepting)]) == source.accepting
+    assert set(xi.locations[sorted(target.rejecting)]) == source.rejecting
+    assert [source.stages[q] for q in xi.locations] == list(target.stages)
+    every = [np.arange(size) for size in (len(xi.letters), len(xi.locations), len(xi.clocks))]
+    assert images(target, xi.letters, xi.locations, xi.clocks) == images(source, *every)
+
+
+@settings(max_examples=150)
+@given(sequential_conjunctions(), sequential_conjunctions())
+def test_other_structures_are_refused(first, second):
+    assume(operators(first) != operators(second))
+    with pytest.raises(AutomatonError, match="not isomorphic") as caught:
+        bijections(build(first), build(second))
+    assert "\n" not in str(caught.value)
+
+
+def test_the_difference_is_named():
+    target = build(one("F", 1, 2))
+    with pytest.raises(AutomatonError, match="number of clocks is 1 in the target's and 2 in the source's"):
+        bijections(target, build(one("FG", 1, 2, 3)))
+    with pytest.raises(
+        AutomatonError, match=r"the edge is 'q0: .* in the target's and 'q0: any letter, c1 < 1"
+    ):
+        bijections(target, build(one("G", 1, 2)))
+    with pytest.raises(AutomatonError, match="number of predicates is 1"):
+        bijections(target, build(CASE_STUDY))
+
+
+def test_every_part_counts():
+    source = build(CASE_STUDY)
+    none: frozenset[int] = frozenset()
+    for changes, what in (
+        ({"initial": 1}, "initial location"),
+        ({"accepting": none}, "accepting locations"),
+        ({"rejecting": frozenset({4})}, "rejecting locations"),
+        ({"stages": (0, 1, 1, 1, 0, 1)}, "stages"),
+        ({"edges": source.edges[:-1]}, "edge is missing"),
+        ({"edges": (*source.edges[:-1], Edge(5, ((0, True),), 5))}, "edge"),
+    ):
+        with pytest.raises(AutomatonError, match=what):
+            bijections(replace(source, **changes), source)
+    bijections(replace(source, edges=source.edges[::-1]), source)
