@@ -1,0 +1,1 @@
+"""Environments: gridworlds with hidden temporal tasks, as arrays and as Gymnasium environments."""
