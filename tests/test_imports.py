@@ -90,11 +90,7 @@ def pickling(path: str, tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and node.attr in ("read_pickle", "to_pickle"):
             yield f"{path}:{node.lineno}: {node.attr} uses pickle; use npz without pickle, and JSON"
-        if (
-            isinstance(node, ast.keyword)
-            and node.arg == "allow_pickle"
-            and ast.unparse(node.value) != "False"
-        ):
+        if isinstance(node, ast.keyword) and node.arg == "allow_pickle" and ast.unparse(node.value) != "False":
             yield f"{path}:{node.value.lineno}: allow_pickle is not False; arrays are stored without pickle"
 
 

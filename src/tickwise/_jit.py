@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -15,17 +16,30 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def _ensure_writable_cache() -> None:
     """Point numba's cache at a temporary folder where neither the package folder nor HOME can be written."""
-    if os.environ.get("NUMBA_CACHE_DIR") or numba.config.CACHE_DIR:
+    config: Any = numba.config
+    if os.environ.get("NUMBA_CACHE_DIR") or config.CACHE_DIR:
         return
     package = Path(__file__).parent / "__pycache__"
-    if os.access(package if package.exists() else package.parent, os.W_OK):
-        return
     user_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path("~").expanduser())
-    if os.access(user_cache, os.W_OK):
+    for folder in (package if package.exists() else package.parent, user_cache):
+        if os.access(folder, os.W_OK):
+            return
+    try:
+        config.CACHE_DIR = str(_private_temporary_folder())
+    except OSError:  # nothing can be written at all: compile without a cache
         return
-    fallback = Path(tempfile.gettempdir()) / f"tickwise-numba-{os.getuid()}"
-    fallback.mkdir(mode=0o700, exist_ok=True)
-    numba.config.CACHE_DIR = str(fallback)
+
+
+def _private_temporary_folder() -> Path:
+    """A folder that only this user can write: what lies in a cache of machine code is run."""
+    if not hasattr(os, "getuid"):
+        return Path(tempfile.mkdtemp(prefix="tickwise-numba-"))
+    folder = Path(tempfile.gettempdir()) / f"tickwise-numba-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not found.st_mode & 0o022:
+        return folder
+    return Path(tempfile.mkdtemp(prefix="tickwise-numba-"))
 
 
 _ensure_writable_cache()
@@ -40,8 +54,9 @@ def njit(function: Function) -> Function:
     Returns:
         The compiled function; its plain form stays at ``.py_func``.
     """
+    options: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
     try:
-        compiled = numba.njit(cache=True, nogil=True, error_model="numpy")(function)
-    except RuntimeError:  # no locator for the cache: compile anew in every process
-        compiled = numba.njit(nogil=True, error_model="numpy")(function)
+        compiled: Any = numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # no place for the cache: compile anew in every process
+        compiled = numba.njit(**options)(function)
     return compiled  # type: ignore[no-any-return]

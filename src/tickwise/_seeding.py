@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import zlib
+import hashlib
+import json
 
 import numpy as np
 
@@ -15,9 +16,10 @@ def seed_sequence(seed: int, *path: str | int) -> np.random.SeedSequence:
         *path: Names and numbers from the root to the place, such as ``"case1", "learn", "III", 4``.
 
     Returns:
-        A seed sequence that no other path shares.
+        A seed sequence that no other path shares (short of a collision of SHA-256).
     """
-    key = [part if isinstance(part, int) else zlib.crc32(part.encode()) for part in path]
+    digest = hashlib.sha256(json.dumps(path).encode()).digest()
+    key = np.frombuffer(digest, dtype="<u4").tolist()
     return np.random.SeedSequence(entropy=seed, spawn_key=tuple(key))
 
 

@@ -84,9 +84,7 @@ def test_the_difference_is_named():
     target = build(one("F", 1, 2))
     with pytest.raises(AutomatonError, match="number of clocks is 1 in the target's and 2 in the source's"):
         bijections(target, build(one("FG", 1, 2, 3)))
-    with pytest.raises(
-        AutomatonError, match=r"the edge is 'q0: .* in the target's and 'q0: any letter, c1 < 1"
-    ):
+    with pytest.raises(AutomatonError, match=r"the edge is 'q0: .* in the target's and 'q0: any letter, c1 < 1"):
         bijections(target, build(one("G", 1, 2)))
     with pytest.raises(AutomatonError, match="number of predicates is 1"):
         bijections(target, build(CASE_STUDY))

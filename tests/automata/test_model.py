@@ -87,9 +87,7 @@ def an_automaton(edges: tuple[Edge, ...]) -> TimedAutomaton:
     predicates = tuple(primitive.predicate for primitive in conjunction.primitives)
     active = (frozenset({0, 1}),) * 2
     nothing: frozenset[int] = frozenset()
-    return TimedAutomaton(
-        predicates, ("a", "b"), 0, ("c1", "c2"), nothing, nothing, edges, (0, 0), active, conjunction
-    )
+    return TimedAutomaton(predicates, ("a", "b"), 0, ("c1", "c2"), nothing, nothing, edges, (0, 0), active, conjunction)
 
 
 @settings(max_examples=300)
@@ -97,9 +95,7 @@ def an_automaton(edges: tuple[Edge, ...]) -> TimedAutomaton:
 def test_determinism_is_decided_exactly(edges):
     """Constants are at most 3, so that valuations up to 4 show every difference."""
     clash = any(
-        first.source == second.source
-        and first.enabled(letter, valuation)
-        and second.enabled(letter, valuation)
+        first.source == second.source and first.enabled(letter, valuation) and second.enabled(letter, valuation)
         for first, second in combinations(edges, 2)
         for letter in range(8)
         for valuation in product(range(5), repeat=2)

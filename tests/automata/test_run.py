@@ -91,9 +91,7 @@ def test_a_run_is_the_walk_step_by_step(data):
 @given(sequential_conjunctions(), trajectories())
 def test_the_run_on_a_trajectory_ends_in_its_verdict(conjunction, values):
     automaton = build(conjunction)
-    assert run(automaton, values, variables=VARIABLES).verdict == automaton.verdict(
-        values, variables=VARIABLES
-    )
+    assert run(automaton, values, variables=VARIABLES).verdict == automaton.verdict(values, variables=VARIABLES)
 
 
 def test_a_run_prints_one_step_a_line():

@@ -46,9 +46,7 @@ def _primitive(primitive: Primitive, j: int, word: Sequence[int]) -> int:
     def inner(tick: int) -> int:
         if not primitive.operator.nested:
             return atom(tick)
-        return combine[primitive.operator.value[1]](
-            atom(later) for later in range(tick, tick + primitive.duration + 1)
-        )
+        return combine[primitive.operator.value[1]](atom(later) for later in range(tick, tick + primitive.duration + 1))
 
     window = range(primitive.window.start, primitive.window.end + 1)
     return combine[primitive.operator.value[0]](inner(tick) for tick in window)

@@ -32,9 +32,7 @@ def pick(probability: np.ndarray, uniform: float) -> int:
     return int(np.flatnonzero(probability)[-1])
 
 
-def walk(
-    mdp: TabularMDP, table: TaskTable, actions: Iterator[int], rng: np.random.Generator
-) -> Iterator[Tick]:
+def walk(mdp: TabularMDP, table: TaskTable, actions: Iterator[int], rng: np.random.Generator) -> Iterator[Tick]:
     """An episode on the arrays in plain Python: state, reward and end of every tick."""
     state = pick(mdp.initial, rng.random())
     task = table.delta[0, table.letter[state]]

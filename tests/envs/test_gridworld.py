@@ -13,9 +13,7 @@ STRAIGHT, LEFT, RIGHT = 0, 1, 2
 EAST, NORTH, WEST, SOUTH = 0, 1, 2, 3
 
 
-def outcomes(
-    world: GridWorld, mdp: TabularMDP, state: int, action: int
-) -> list[tuple[tuple[int, int, int], float]]:
+def outcomes(world: GridWorld, mdp: TabularMDP, state: int, action: int) -> list[tuple[tuple[int, int, int], float]]:
     row = zip(mdp.successor[state, action], mdp.probability[state, action], strict=True)
     return [(world.place(int(successor)), round(float(share), 12)) for successor, share in row if share > 0]
 

@@ -78,9 +78,7 @@ BOXES = st.sampled_from([A, B, C, Box.of(x=(0, 4)), Box.of(x=(3, 4), y=(0, 1))])
 def trajectories(draw: st.DrawFn, deadline: int) -> list[int]:
     """States of few kinds, in runs, so that stays and gaps of every length are common."""
     pool = draw(st.lists(st.integers(0, MDP.n_states - 1), min_size=1, max_size=3))
-    runs = draw(
-        st.lists(st.tuples(st.sampled_from(pool), st.integers(1, 5)), min_size=deadline + 1, max_size=30)
-    )
+    runs = draw(st.lists(st.tuples(st.sampled_from(pool), st.integers(1, 5)), min_size=deadline + 1, max_size=30))
     return [state for state, length in runs for _ in range(length)][: deadline + 1]
 
 

@@ -131,17 +131,13 @@ def test_text_is_not_numeric() -> None:
     with pytest.raises(DataError, match=r"^the data is not numeric \(.*\); give numbers only$"):
         as_batch([["a", "b"]], XY)
     frame = pd.DataFrame({"x": ["a"], "y": [1.0]})
-    with pytest.raises(
-        DataError, match=r"^column 'x' of the trajectory is not numeric \(.*\); give numbers only$"
-    ):
+    with pytest.raises(DataError, match=r"^column 'x' of the trajectory is not numeric \(.*\); give numbers only$"):
         as_batch(frame, XY)
 
 
 @pytest.mark.parametrize("X", [ONE, [ONE], ONE[None]])
 def test_an_unknown_variable_is_named_with_what_there_is(X: object) -> None:
-    with pytest.raises(
-        UnknownVariableError, match=r"the formula names 'z', which .* does not have; it has 'x', 'y'$"
-    ):
+    with pytest.raises(UnknownVariableError, match=r"the formula names 'z', which .* does not have; it has 'x', 'y'$"):
         as_batch(X, ("z",), variables=XY)  # type: ignore[arg-type]
     with pytest.raises(UnknownVariableError, match=r"it has 'a', 'b'$"):
         as_batch(pd.DataFrame(ONE, columns=["a", "b"]), XY)

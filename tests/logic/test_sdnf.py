@@ -160,8 +160,7 @@ NO_FORM = "has no sequential disjunctive normal form:"
         ),
         (
             "F[0,5] G[0,2] F[0,3] (x >= 3)",
-            f"F[0,5] G[0,2] F[0,3] (x >= 3) {NO_FORM} its operators alternate three times; "
-            "use F, G, F G or G F",
+            f"F[0,5] G[0,2] F[0,3] (x >= 3) {NO_FORM} its operators alternate three times; use F, G, F G or G F",
         ),
         (
             "F[0,5] ((x >= 3) & G[1,2] (y >= 3))",
@@ -177,18 +176,15 @@ NO_FORM = "has no sequential disjunctive normal form:"
         ),
         (
             "F[0,5] ((x >= 3) & (x <= 2))",
-            f"F[0,5] ((x >= 3) & (x <= 2)) {NO_FORM} x >= 3 and x <= 2 exclude each other; "
-            "make the regions overlap",
+            f"F[0,5] ((x >= 3) & (x <= 2)) {NO_FORM} x >= 3 and x <= 2 exclude each other; make the regions overlap",
         ),
         (
             "G[0,5] ((x >= 3) & (x <= 2))",
-            f"G[0,5] ((x >= 3) & (x <= 2)) {NO_FORM} x >= 3 and x <= 2 exclude each other; "
-            "make the regions overlap",
+            f"G[0,5] ((x >= 3) & (x <= 2)) {NO_FORM} x >= 3 and x <= 2 exclude each other; make the regions overlap",
         ),
         (
             "G[0,5] ((x >= 3) | (x <= 4))",
-            f"G[0,5] ((x >= 3) | (x <= 4)) {NO_FORM} a part of its operand holds everywhere; "
-            "leave that part out",
+            f"G[0,5] ((x >= 3) | (x <= 4)) {NO_FORM} a part of its operand holds everywhere; leave that part out",
         ),
         (
             "F[0,5] (x >= 3) & G[5,6] (y >= 3)",
@@ -235,9 +231,7 @@ def test_malformed_parts() -> None:
         Primitive(Operator.EVENTUALLY, Interval(0, 1), 3, IN_X)
     with pytest.raises(FormulaError, match="operator GF does not go with a duration of 0 ticks"):
         Primitive(Operator.ALWAYS_EVENTUALLY, Interval(0, 1), 0, IN_X)
-    with pytest.raises(
-        FormulaError, match="the predicate !true of a primitive is neither a box nor its complement"
-    ):
+    with pytest.raises(FormulaError, match="the predicate !true of a primitive is neither a box nor its complement"):
         Primitive(Operator.EVENTUALLY, Interval(0, 1), 0, Not(Constant(True)))
     with pytest.raises(FormulaError, match="a sequential conjunction needs at least one primitive"):
         SequentialConjunction(())

@@ -36,9 +36,7 @@ def test_the_paper_s_formulas() -> None:
 
 def test_the_second_case_study() -> None:
     source = parse("G[0,25] F[0,8] (2 <= x <= 3 & 2 <= y <= 3)")
-    target = parse(
-        "G[0,40] F[0,10] (2 <= x <= 3 & 3 <= y <= 4) | G[0,40] F[0,10] (4 <= x <= 5 & 3 <= y <= 4)"
-    )
+    target = parse("G[0,40] F[0,10] (2 <= x <= 3 & 3 <= y <= 4) | G[0,40] F[0,10] (4 <= x <= 5 & 3 <= y <= 4)")
     assert not structurally_equivalent(target, source)
     assert structurally_transferable(target, source)
     assert not structurally_transferable(source, target)
@@ -54,9 +52,7 @@ def test_numbers_and_predicates_do_not_matter(phi: SDNF, predicate: Box | Not) -
 
 @settings(max_examples=50)
 @given(sdnfs(), predicates(), st.integers(2, 4))
-def test_disjunctions_of_equivalents_are_transferable(
-    source: SDNF, predicate: Box | Not, copies: int
-) -> None:
+def test_disjunctions_of_equivalents_are_transferable(source: SDNF, predicate: Box | Not, copies: int) -> None:
     other = renumbered(source, predicate)
     target = SDNF(source.disjuncts + other.disjuncts * (copies - 1))
     assert structurally_transferable(target, source)

@@ -100,9 +100,7 @@ def build(conjunction: SequentialConjunction) -> TimedAutomaton:
         The automaton; its size and its edges depend on the operators O_T only, its constants on the numbers.
     """
     primitives = conjunction.primitives
-    places = [
-        (stage, place) for stage, primitive in enumerate(primitives) for place in _working(primitive.operator)
-    ]
+    places = [(stage, place) for stage, primitive in enumerate(primitives) for place in _working(primitive.operator)]
     working, stages = len(places), [stage for stage, _ in places]
     index = {key: number for number, key in enumerate(places)}
     index[(len(primitives), "W")] = working

@@ -102,8 +102,7 @@ def to_dot(automaton: TimedAutomaton) -> str:
         lines.append(f'  n{location} [label={_dot_text(name)}, shape={shape}, fillcolor="{colour}"];')
     lines.append(f"  start -> n{automaton.initial};")
     lines += [
-        f"  n{edge.source} -> n{edge.target} [label={_dot_text(label(automaton, edge))}];"
-        for edge in automaton.edges
+        f"  n{edge.source} -> n{edge.target} [label={_dot_text(label(automaton, edge))}];" for edge in automaton.edges
     ]
     # "\l" ends a line and aligns it to the left
     rows = "".join(_dot_text(row)[1:-1] + "\\l" for row in legend(automaton))
@@ -119,8 +118,7 @@ def to_mermaid(automaton: TimedAutomaton) -> str:
         lines.append(f"  n{location}{opening}{_mermaid_text(name)}{closing}")
     lines.append(f"  start --> n{automaton.initial}")
     lines += [
-        f"  n{edge.source} -->|{_mermaid_text(label(automaton, edge))}| n{edge.target}"
-        for edge in automaton.edges
+        f"  n{edge.source} -->|{_mermaid_text(label(automaton, edge))}| n{edge.target}" for edge in automaton.edges
     ]
     rows = "<br>".join(_mermaid_text(row)[1:-1] for row in legend(automaton))
     lines.append(f'  legend["{rows}"]')

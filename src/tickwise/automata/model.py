@@ -47,9 +47,7 @@ class ClockConstraint:
 
     def __post_init__(self) -> None:
         if self.comparison not in COMPARISONS:
-            raise AutomatonError(
-                f"comparison {self.comparison!r} is unknown; use one of {', '.join(COMPARISONS)}"
-            )
+            raise AutomatonError(f"comparison {self.comparison!r} is unknown; use one of {', '.join(COMPARISONS)}")
         _check_index("clock", self.clock, UNBOUNDED)
         _check_index("constant of a clock constraint", self.value, UNBOUNDED)
 
@@ -297,9 +295,7 @@ def _check_parts(automaton: TimedAutomaton) -> None:
     for location in automaton.accepting | automaton.rejecting:
         _check_index("accepting or rejecting location", location, count)
     for location in automaton.accepting & automaton.rejecting:
-        raise AutomatonError(
-            f"location {automaton.locations[location]!r} is both accepting and rejecting; choose one"
-        )
+        raise AutomatonError(f"location {automaton.locations[location]!r} is both accepting and rejecting; choose one")
     if len(automaton.stages) != count or len(automaton.active) != count:
         raise AutomatonError(
             f"there are {count} locations, but {len(automaton.stages)} stages and {len(automaton.active)} "
@@ -321,8 +317,7 @@ def _check_edge(automaton: TimedAutomaton, number: int, edge: Edge) -> None:
         _check_index(f"clock of edge {number}", clock, len(automaton.clocks))
     if edge.source in automaton.accepting | automaton.rejecting and edge.target != edge.source:
         raise AutomatonError(
-            f"edge {number} leaves {automaton.locations[edge.source]!r}; "
-            "accepting and rejecting locations absorb"
+            f"edge {number} leaves {automaton.locations[edge.source]!r}; accepting and rejecting locations absorb"
         )
 
 

@@ -93,11 +93,7 @@ class TimedWord:
     @property
     def letters(self) -> tuple[int, ...]:
         """The letter of every tick from 0 to L: what a tick automaton reads."""
-        spread = [
-            letter
-            for (letter, tick), (_, following) in pairwise(self.symbols)
-            for _ in range(tick, following)
-        ]
+        spread = [letter for (letter, tick), (_, following) in pairwise(self.symbols) for _ in range(tick, following)]
         return (*spread, self.symbols[-1][0])
 
 

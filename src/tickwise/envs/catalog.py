@@ -80,8 +80,7 @@ CASE_STUDY_2_TARGET = EnvironmentSpec(
 """7×7, 40 ticks: B_1^T = [2,3]×[3,4] or B_2^T = [4,5]×[3,4], the same one, every 10 ticks."""
 
 CATALOG = {
-    spec.name: spec
-    for spec in (CASE_STUDY_1_SOURCE, CASE_STUDY_1_TARGET, CASE_STUDY_2_SOURCE, CASE_STUDY_2_TARGET)
+    spec.name: spec for spec in (CASE_STUDY_1_SOURCE, CASE_STUDY_1_TARGET, CASE_STUDY_2_SOURCE, CASE_STUDY_2_TARGET)
 }
 """All environments by name."""
 

@@ -174,9 +174,7 @@ class GridWorldEnv(gymnasium.Env[NDArray[np.int64], np.int64]):
         if self._state is None or self._ended:
             raise ResetNeeded("no episode is going on; call reset() before step()")
         if not self.action_space.contains(action):
-            raise ConfigurationError(
-                f"there is no action {action!r}; use 0 (straight), 1 (left) or 2 (right)"
-            )
+            raise ConfigurationError(f"there is no action {action!r}; use 0 (straight), 1 (left) or 2 (right)")
         outcome = draw(self._thresholds[self._state, action], self.np_random.random())
         self._state = int(self._successor[self._state, action, outcome])
         reward, self._ended = self._monitor.advance(self._state)

@@ -46,9 +46,7 @@ class GridWorld:
 
     def __post_init__(self) -> None:
         if isinstance(self.size, bool) or not isinstance(self.size, int) or self.size < 1:
-            raise ConfigurationError(
-                f"the world's size is {self.size!r}; use a whole number of cells, 1 or more"
-            )
+            raise ConfigurationError(f"the world's size is {self.size!r}; use a whole number of cells, 1 or more")
         if not 0 <= self.slip <= 0.5:
             raise ConfigurationError(f"slip is {self.slip!r}; use a probability for each side, from 0 to 0.5")
         if not 0 <= self.turn_failure <= 1:

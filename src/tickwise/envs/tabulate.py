@@ -84,9 +84,7 @@ class TabularMDP:
 
     def _check_shapes(self) -> None:
         if self.successor.ndim != 3 or not self.successor.size:
-            raise DataError(
-                f"successor has shape {self.successor.shape}; use (states, actions, outcomes), none zero"
-            )
+            raise DataError(f"successor has shape {self.successor.shape}; use (states, actions, outcomes), none zero")
         wanted = {
             "probability": self.successor.shape,
             "initial": self.successor.shape[:1],
@@ -97,9 +95,7 @@ class TabularMDP:
             if getattr(self, name).shape != shape:
                 raise DataError(f"{name} has shape {getattr(self, name).shape}; use {shape}")
         if len(self.limits) != len(self.variables):
-            raise DataError(
-                f"there are {len(self.limits)} limits for {len(self.variables)} variables; give one each"
-            )
+            raise DataError(f"there are {len(self.limits)} limits for {len(self.variables)} variables; give one each")
 
     def _check_numbers(self) -> None:
         for name, array, count in (
@@ -111,9 +107,7 @@ class TabularMDP:
         for name, rows in (("probability", self.probability), ("initial", self.initial)):
             # written so that NaN fails too
             if not ((rows >= 0).all() and (abs(rows.sum(axis=-1) - 1) <= _TOLERANCE).all()):
-                raise DataError(
-                    f"a row of {name} is not a distribution; use numbers of 0 or more that sum to 1"
-                )
+                raise DataError(f"a row of {name} is not a distribution; use numbers of 0 or more that sum to 1")
         if not np.isfinite(self.cell_coordinates).all():
             raise DataError("cell_coordinates has a number that is not finite")
 

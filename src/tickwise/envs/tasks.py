@@ -102,9 +102,7 @@ class TaskTable:
             if getattr(self, name).shape != shape:
                 raise DataError(f"{name} has shape {getattr(self, name).shape}; use {shape}")
         if len(self.stages) != len(self.delta):
-            raise DataError(
-                f"there are {len(self.stages)} stages for {len(self.delta)} task states; give one each"
-            )
+            raise DataError(f"there are {len(self.stages)} stages for {len(self.delta)} task states; give one each")
         for name, array, count in (
             ("delta", self.delta, len(self.delta)),
             ("letter", self.letter, self.delta.shape[1]),
@@ -225,9 +223,7 @@ class Recurrence:
     def landmarks(self) -> tuple[Landmark, ...]:
         """The regions for a map, in the order of drawing."""
         greens = tuple(Landmark("G", "green", box) for box in self.greens)
-        blues = (
-            Landmark(label, "blue", box) for label, box in zip(self._labels(), self.regions, strict=True)
-        )
+        blues = (Landmark(label, "blue", box) for label, box in zip(self._labels(), self.regions, strict=True))
         return (*greens, *blues)
 
     def _labels(self) -> tuple[str, ...]:

@@ -104,9 +104,7 @@ def _numeric(X: Any, what: str) -> NDArray[np.float64]:
         raise DataError(f"{what} is not numeric ({error}); give numbers only") from None
 
 
-def _trajectory(
-    X: Any, names: Sequence[str], variables: Sequence[str] | None, what: str
-) -> NDArray[np.float64]:
+def _trajectory(X: Any, names: Sequence[str], variables: Sequence[str] | None, what: str) -> NDArray[np.float64]:
     """One trajectory's wanted columns, shape (ticks, names)."""
     if _is_table(X):
         values, variables = _table(X, names, variables, what)
@@ -169,9 +167,7 @@ def _require(names: Sequence[str], there: Sequence[str], what: str) -> None:
     for name in names:
         if name not in there:
             known = ", ".join(map(repr, there)) or "nothing"
-            raise UnknownVariableError(
-                f"the formula names {name!r}, which {what} does not have; it has {known}"
-            )
+            raise UnknownVariableError(f"the formula names {name!r}, which {what} does not have; it has {known}")
 
 
 def _stack(parts: list[NDArray[np.float64]], names: Sequence[str]) -> Batch:
@@ -195,9 +191,7 @@ def _rectangular(
     if given.shape != (count,) or not np.issubdtype(given.dtype, np.integer):
         raise DataError(f"lengths has shape {given.shape} and type {given.dtype}; give {count} whole numbers")
     if count and not (given.min() >= 1 and given.max() <= ticks):
-        raise DataError(
-            f"lengths are from {given.min()} to {given.max()}; they must be from 1 to {ticks} ticks"
-        )
+        raise DataError(f"lengths are from {given.min()} to {given.max()}; they must be from 1 to {ticks} ticks")
     return Batch(values, given.astype(np.int64), single=False)
 
 

@@ -39,9 +39,7 @@ class _Notation:
 
 
 # names that are read as something else; grammar.lark has the same words
-_RESERVED = re.compile(
-    r"F_?|G_?|ev_?|alw_?|(?i:(eventually|finally|always|globally)_?|and|or|not|true|false)"
-)
+_RESERVED = re.compile(r"F_?|G_?|ev_?|alw_?|(?i:(eventually|finally|always|globally)_?|and|or|not|true|false)")
 _PLAIN_NAME = re.compile(r"[^\W\d]\w*(\.\w+)*")
 _SYMBOL = re.compile(r"[^\W\d_]")
 _SUBSCRIPTED = re.compile(r"([^\W\d_])_([^\W_]+)")

@@ -61,13 +61,9 @@ class Primitive:
 
     def __post_init__(self) -> None:
         if self.operator.nested != (self.duration > 0):
-            raise FormulaError(
-                f"operator {self.operator} does not go with a duration of {self.duration} ticks"
-            )
+            raise FormulaError(f"operator {self.operator} does not go with a duration of {self.duration} ticks")
         if not (isinstance(self.predicate, Box) or isinstance(self.predicate.operand, Box)):
-            raise FormulaError(
-                f"the predicate {self.predicate} of a primitive is neither a box nor its complement"
-            )
+            raise FormulaError(f"the predicate {self.predicate} of a primitive is neither a box nor its complement")
 
     @property
     def start(self) -> int:
@@ -236,9 +232,7 @@ def _conjoin(parts: Iterable[_Disjunction]) -> _Disjunction:
     found: _Disjunction = ((),)
     for part in parts:
         if len(found) * len(part) > _MOST_CONJUNCTIONS:
-            raise FormulaError(
-                f"the normal form has more than {_MOST_CONJUNCTIONS} disjuncts; split the formula up"
-            )
+            raise FormulaError(f"the normal form has more than {_MOST_CONJUNCTIONS} disjuncts; split the formula up")
         found = tuple(tuple(dict.fromkeys(left + right)) for left, right in product(found, part))
     return found
 

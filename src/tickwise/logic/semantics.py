@@ -150,9 +150,7 @@ def _distances(box: Box, values: NDArray[np.float64], variables: Sequence[str]) 
 def _column(name: str, values: NDArray[np.float64], variables: Sequence[str]) -> NDArray[np.float64]:
     if name not in variables:
         there = ", ".join(map(repr, variables)) or "nothing"
-        raise UnknownVariableError(
-            f"the predicate names {name!r}, which the data does not have; it has {there}"
-        )
+        raise UnknownVariableError(f"the predicate names {name!r}, which the data does not have; it has {there}")
     return values[..., list(variables).index(name)]
 
 
@@ -222,9 +220,7 @@ class _Signals:
         signal[..., :known] = np.where(past, self._unknown[:, None, None], signal[..., :known])
         return signal
 
-    def _window(
-        self, combine: _Combine[Any], interval: Interval, operand: Formula, count: int
-    ) -> NDArray[Any]:
+    def _window(self, combine: _Combine[Any], interval: Interval, operand: Formula, count: int) -> NDArray[Any]:
         # a tick past the data reads like any other one, so windows may be cut there
         start, end = min(interval.start, self._ticks), min(interval.end, self._ticks)
         need = count + end

@@ -18,9 +18,7 @@ def structure(phi: Formula | SDNF) -> tuple[tuple[Operator, ...], ...]:
     Raises:
         FormulaError: If the formula has no SDNF.
     """
-    return tuple(
-        tuple(primitive.operator for primitive in disjunct.primitives) for disjunct in to_sdnf(phi).disjuncts
-    )
+    return tuple(tuple(primitive.operator for primitive in disjunct.primitives) for disjunct in to_sdnf(phi).disjuncts)
 
 
 def structurally_equivalent(a: Formula | SDNF, b: Formula | SDNF) -> bool:

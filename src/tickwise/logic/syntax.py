@@ -103,13 +103,9 @@ class Interval:
             if isinstance(bound, bool) or not isinstance(bound, int):
                 raise FormulaError(f"interval bound {bound!r} is not a whole number of ticks")
         if self.start < 0:
-            raise FormulaError(
-                f"interval [{self.start},{self.end}] starts before tick 0; use a start of 0 or more"
-            )
+            raise FormulaError(f"interval [{self.start},{self.end}] starts before tick 0; use a start of 0 or more")
         if self.start > self.end:
-            raise FormulaError(
-                f"interval [{self.start},{self.end}] is reversed; write [{self.end},{self.start}]"
-            )
+            raise FormulaError(f"interval [{self.start},{self.end}] is reversed; write [{self.end},{self.start}]")
 
     def __str__(self) -> str:
         return f"[{self.start},{self.end}]"
@@ -174,9 +170,7 @@ class Box(Formula):
         """The names of the variables, in order."""
         return tuple(bound.variable for bound in self.bounds)
 
-    def centroid(
-        self, variables: Sequence[str], limits: Sequence[tuple[float, float]]
-    ) -> NDArray[np.float64]:
+    def centroid(self, variables: Sequence[str], limits: Sequence[tuple[float, float]]) -> NDArray[np.float64]:
         """The centroid Cr(ρ) of the region within limits (Algorithm 2, line 6).
 
         Args:
