@@ -1,0 +1,1 @@
+"""Inference of formulas from labelled trajectories (Section III)."""

@@ -1,0 +1,281 @@
+"""Step 2 of Section IV-B: fit a formula of a given structure to the target's trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.errors import ConfigurationError
+from tickwise.inference.objective import Objective, formula_signature, trajectory_weights
+from tickwise.inference.prior import Prior
+from tickwise.inference.space import SearchSpace, shape_of
+from tickwise.inference.starts import sampled_starts
+from tickwise.inference.swarm import SwarmResult, SwarmSettings, maximise
+from tickwise.inference.trajectories import LabelledTrajectories
+from tickwise.inference.tree import InferenceSettings
+from tickwise.logic.sdnf import SDNF, Operator
+
+_COVERINGS = 6  # starts by covering of each search over several disjuncts
+
+Structure = Sequence[Sequence[Operator | str]]
+"""For each disjunct the temporal operators of its primitives, in order, such as ``(("FG", "F"),)``."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """A formula of a fixed structure, with the parameters that a search found best.
+
+    Attributes:
+        formula: The formula.
+        objective: J = CR + λ I, with class weights in CR.
+        rate: The classification rate CR.
+        gain: The information gain I.
+        satisfying: Whether it is a satisfying formula (Problem 1).
+    """
+
+    formula: SDNF
+    objective: float
+    rate: float
+    gain: float
+    satisfying: bool
+
+    @property
+    def size(self) -> int:
+        """The size ϱ(φ)."""
+        return self.formula.size
+
+
+@dataclass(frozen=True, slots=True)
+class TransferFit:
+    """The outcome of Step 2.
+
+    Attributes:
+        attempts: The best formula with one, two, … copies of the source's structure.
+        transferable: Whether the last attempt is satisfying, so that logical transferability is identified.
+        reason: One sentence in plain words.
+    """
+
+    attempts: tuple[Fit, ...]
+    transferable: bool
+    reason: str
+
+    @property
+    def formula(self) -> SDNF | None:
+        """The satisfying formula φ^T; None if there is none."""
+        return self.attempts[-1].formula if self.transferable else None
+
+
+def fit_structure(
+    data: LabelledTrajectories,
+    prior: Prior,
+    space: SearchSpace,
+    structure: Structure | SDNF,
+    settings: InferenceSettings,
+    swarm: SwarmSettings,
+    rng: np.random.Generator,
+    *,
+    start: SDNF | None = None,
+) -> Fit:
+    """Optimise all parameters of one formula together, its operators fixed.
+
+    A swarm moves all parameters at once. Then each primitive in turn is searched anew with the others held, until none
+    gets better: windows of neighbours push each other, and a joint move that keeps all good is rare. All of this is
+    repeated, the swarm's restarts times the number of primitives of the longest disjunct, and the best is kept. Of
+    several disjuncts some starts are by covering: each is fitted alone to the positives that those before it leave.
+
+    Args:
+        data: Labelled trajectories, with both labels.
+        prior: The prior G_L of the information gain.
+        space: What boxes and times may be chosen.
+        structure: A source formula, which gives operators and the polarity of each predicate, or the operators alone.
+        settings: ζ, ϱ_th, λ and class weights.
+        swarm: How hard to search.
+        rng: The source of all randomness.
+        start: A formula whose disjuncts are a good guess for the first disjuncts.
+
+    Returns:
+        The best formula found.
+
+    Raises:
+        DataError: If a label is missing.
+        ConfigurationError: If the structure is empty or does not fit into the space's horizon.
+    """
+    data.require_both_classes()
+    pairs = _pairs(structure)
+    shape = shape_of(pairs)
+    gaps = ((0, space.horizon),)
+    if not space.room(shape, gaps):
+        raise ConfigurationError(
+            f"{max(map(len, pairs))} primitives one after the other do not fit into {space.horizon} ticks; "
+            "use a longer horizon"
+        )
+    weights = trajectory_weights(data.labels, settings.class_weight)
+    objective = Objective(data, weights, prior, space, shape, gaps, settings.information_weight)
+    single = replace(swarm, restarts=1)
+    position, value = np.zeros(0), -np.inf
+    for _ in range(swarm.restarts * max(map(len, pairs))):
+        known = [] if start is None else [space.encode(start)]
+        if len(pairs) > 1:
+            known += [_covering(objective, pairs, single, rng) for _ in range(_COVERINGS)]
+        found = _one_search(objective, _blocks(space, pairs), single, rng, known)
+        if found.value > value:
+            position, value = found.position, found.value
+    formula = objective.formula(position)
+    rate, gain = objective.parts(formula)
+    good = rate >= settings.rate and formula.size <= settings.size
+    return Fit(formula, value, rate, gain, good)
+
+
+def fit_transferable(
+    data: LabelledTrajectories,
+    prior: Prior,
+    space: SearchSpace,
+    source: SDNF,
+    settings: InferenceSettings,
+    swarm: SwarmSettings,
+    rng: np.random.Generator,
+) -> TransferFit:
+    """Step 2: look for a satisfying formula that is structurally transferable from the source (Definition 7).
+
+    The number of structurally equivalent copies joined by ∨ grows from one until a satisfying formula is found or the
+    size constraint would be violated.
+
+    Args:
+        data: The target's labelled trajectories.
+        prior: The target's prior.
+        space: The target's search space.
+        source: φ^S, a satisfying formula of the source task.
+        settings: ζ, ϱ_th, λ and class weights.
+        swarm: How hard to search.
+        rng: The source of all randomness.
+
+    Returns:
+        Every attempt, and whether logical transferability (Definition 8) is identified.
+
+    Raises:
+        DataError: If a label is missing.
+        ConfigurationError: If the structure does not fit into the space's horizon.
+    """
+    attempts: list[Fit] = []
+    copies = 1
+    while copies * source.size <= settings.size:
+        previous = attempts[-1].formula if attempts else None
+        structure = SDNF(source.disjuncts * copies)
+        attempts.append(fit_structure(data, prior, space, structure, settings, swarm, rng, start=previous))
+        if attempts[-1].satisfying:
+            noun = "formula" if copies == 1 else f"disjunction of {copies} formulas"
+            reason = (
+                f"A {noun} structurally equivalent with the source's classifies {attempts[-1].rate:.1%} of the "
+                f"target's trajectories rightly, at least the {settings.rate:.1%} that are asked for."
+            )
+            return TransferFit(tuple(attempts), True, reason)
+        copies += 1
+    if not attempts:
+        reason = f"The source's formula has size {source.size}, more than the {settings.size} that are allowed."
+    else:
+        best = max(attempt.rate for attempt in attempts)
+        reason = (
+            f"Logical transferability is not identified: with up to {len(attempts)} "
+            f"cop{'y' if len(attempts) == 1 else 'ies'} of the source's structure the best classification rate on the "
+            f"target is {best:.1%}, below the {settings.rate:.1%} that are asked for, and one more copy would exceed "
+            f"size {settings.size}."
+        )
+    return TransferFit(tuple(attempts), False, reason)
+
+
+def _pairs(structure: Structure | SDNF) -> list[list[tuple[Operator, bool]]]:
+    if isinstance(structure, SDNF):
+        return [[(p.operator, p.complemented) for p in disjunct.primitives] for disjunct in structure.disjuncts]
+    if not structure or not all(structure):
+        raise ConfigurationError("the structure has no primitive; give one tuple of operators per disjunct")
+    try:
+        return [[(Operator(operator), False) for operator in disjunct] for disjunct in structure]
+    except ValueError:
+        raise ConfigurationError(f"the structure {structure!r} names an unknown operator; use F, G, FG, GF") from None
+
+
+def _blocks(space: SearchSpace, pairs: Sequence[Sequence[tuple[Operator, bool]]]) -> list[slice]:
+    """Where each primitive's parameters lie in a position."""
+    blocks, at = [], 0
+    for operator, _ in (pair for disjunct in pairs for pair in disjunct):
+        width = 2 * len(space.variables) + 2 + operator.nested
+        blocks.append(slice(at, at + width))
+        at += width
+    return blocks
+
+
+def _one_search(
+    objective: Objective,
+    blocks: Sequence[slice],
+    swarm: SwarmSettings,
+    rng: np.random.Generator,
+    known: Sequence[NDArray[np.float64]],
+) -> SwarmResult:
+    """One joint swarm, then each primitive in turn with the others held, until none gets better."""
+    space, shape = objective.space, objective.shape
+    (lower, upper), units = space.bounds(shape), space.units(shape)
+    starts = sampled_starts(objective.data, space, shape, swarm.particles // 2, rng)
+    for row, position in zip(starts, known, strict=False):
+        row[: len(position)] = position
+    best = maximise(objective, lower, upper, units, swarm, rng, starts)
+    improved = len(blocks) > 1
+    while improved:
+        improved = False
+        for block in blocks:
+            held = _Held(objective, best.position, block)
+            single = sampled_starts(objective.data, space, shape, swarm.particles // 2, rng)[:, block]
+            single = np.vstack((best.position[None, block], single))
+            found = maximise(held, lower[block], upper[block], units[block], swarm, rng, single)
+            if found.value > best.value:
+                best, improved = replace(found, position=held.whole(found.position[None])[0]), True
+    return best
+
+
+def _covering(
+    objective: Objective,
+    pairs: Sequence[Sequence[tuple[Operator, bool]]],
+    swarm: SwarmSettings,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """A position of the whole from disjuncts that are fitted one after the other.
+
+    In a disjunction a negative that one disjunct lets through is lost, whereas a positive that it misses may be
+    another's: so negatives weigh more here, twice the number of disjuncts.
+    """
+    data, parts = objective.data, []
+    left = np.ones(len(data), dtype=np.bool_)
+    weights = np.where(data.labels == 1, 1.0, 2.0 * len(pairs)) * objective.weights
+    for disjunct in pairs:
+        gain = objective.information_weight * objective.weights.sum() / weights[left].sum()
+        alone = replace(
+            objective,
+            data=data.select(left),
+            weights=weights[left],
+            shape=shape_of([disjunct]),
+            information_weight=float(gain),  # in trajectories, the gain is worth what it was
+        )
+        parts.append(_one_search(alone, _blocks(objective.space, [disjunct]), swarm, rng, ()).position)
+        rest = left & ~(formula_signature(alone.formula(parts[-1]), data) & (data.labels == 1))
+        left = rest if (data.labels[rest] == 1).any() else left
+    return np.concatenate(parts)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Held:
+    """The objective as a function of one primitive's parameters, the others held."""
+
+    objective: Objective
+    position: NDArray[np.float64]
+    block: slice
+
+    def __call__(self, positions: NDArray[np.float64], incumbents: NDArray[np.float64]) -> NDArray[np.float64]:
+        return self.objective(self.whole(positions), incumbents)
+
+    def whole(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The full positions, shape ``(particles, dimensions)``."""
+        full = np.tile(self.position, (len(positions), 1))
+        full[:, self.block] = positions
+        return full

@@ -1,0 +1,218 @@
+"""Labelled trajectories: the set S_L of Problem 1, checked once so that every kernel may trust it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from tickwise.errors import DataError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LabelledTrajectories:
+    """Trajectories with labels 1 (desired) and -1 (undesired), possibly of different lengths.
+
+    The arrays are copied and made read-only.
+
+    Attributes:
+        values: States, shape ``(n, ticks, variables)``, float64; NaN after a trajectory's end.
+        lengths: Number of states s_0 … s_L of each trajectory, shape ``(n,)``, int64.
+        labels: 1 or -1, shape ``(n,)``, int8.
+        variables: Names of the columns of ``values``.
+        ids: One unique name per trajectory.
+
+    Raises:
+        DataError: If a shape does not fit, a value inside a trajectory is not finite, a label is not ±1, an id or
+            a variable occurs twice, or there is nothing at all.
+    """
+
+    values: NDArray[np.float64]
+    lengths: NDArray[np.int64]
+    labels: NDArray[np.int8]
+    variables: tuple[str, ...]
+    ids: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        values = _real(self.values, "the values").copy()
+        if values.ndim != 3:
+            raise DataError(f"values have shape {values.shape}; use (trajectories, ticks, variables)")
+        n, ticks, width = values.shape
+        if n == 0 or ticks == 0:
+            raise DataError(f"values have shape {values.shape}: give at least one trajectory of at least one tick")
+        variables, ids = tuple(map(str, self.variables)), tuple(map(str, self.ids))
+        if len(variables) != width or width == 0:
+            raise DataError(f"{width} columns of values but {len(variables)} variable names; name every column")
+        for kind, names in (("variable", variables), ("trajectory id", ids)):
+            if len(set(names)) < len(names):
+                twice = next(name for name in names if names.count(name) > 1)
+                raise DataError(f"{kind} {twice!r} occurs twice; make the names unique")
+        lengths = _whole(self.lengths, n, "length")
+        labels = _whole(self.labels, n, "label")
+        if len(ids) != n:
+            raise DataError(f"{n} trajectories but {len(ids)} ids; give one id per trajectory")
+        _check_lengths(lengths, ticks, ids)
+        _check_labels(labels, ids)
+        _check_states(values, lengths, variables, ids)
+        values[np.arange(ticks) >= lengths[:, None]] = np.nan
+        stored = (values, lengths, labels.astype(np.int8), variables, ids)
+        for name, value in zip(("values", "lengths", "labels", "variables", "ids"), stored, strict=True):
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_arrays(
+        cls,
+        X: ArrayLike | Sequence[ArrayLike],
+        y: ArrayLike,
+        variables: Sequence[str] | None = None,
+        lengths: ArrayLike | None = None,
+        ids: Sequence[str] | None = None,
+    ) -> LabelledTrajectories:
+        """Build from one array, or from a list of arrays of different lengths.
+
+        Args:
+            X: States, shape ``(n, ticks, variables)``, or a list of ``(ticks, variables)`` arrays.
+            y: Labels 1 or -1, shape ``(n,)``.
+            variables: Names of the columns; ``x0, x1, …`` if left out.
+            lengths: Number of states of each trajectory, shape ``(n,)``; all ticks if left out.
+            ids: Names of the trajectories; ``0, 1, …`` if left out.
+
+        Returns:
+            The checked trajectories.
+
+        Raises:
+            DataError: As the class, or if the arrays of a list do not fit together or come with ``lengths``.
+        """
+        if isinstance(X, np.ndarray):
+            values = X
+            counts: ArrayLike = np.full(len(X), X.shape[1] if X.ndim > 1 else 0) if lengths is None else lengths
+        else:
+            values, counts = _padded(X)
+            if lengths is not None:
+                given = np.asarray(lengths)
+                if given.shape != np.shape(counts) or (given > counts).any():
+                    raise DataError("lengths go beyond the listed arrays; leave lengths out for a list of arrays")
+                counts = given
+        width = values.shape[2] if values.ndim == 3 else 0
+        names = tuple(f"x{column}" for column in range(width)) if variables is None else tuple(variables)
+        labels = tuple(str(number) for number in range(len(values))) if ids is None else tuple(ids)
+        return cls(values, np.asarray(counts), np.asarray(y), names, labels)
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    @property
+    def horizon(self) -> int:
+        """The last tick L of the longest trajectory."""
+        return int(self.lengths.max()) - 1
+
+    @property
+    def positives(self) -> int:
+        """The number of trajectories with label 1."""
+        return int(np.count_nonzero(self.labels == 1))
+
+    @property
+    def negatives(self) -> int:
+        """The number of trajectories with label -1."""
+        return int(np.count_nonzero(self.labels == -1))
+
+    def require_both_classes(self) -> LabelledTrajectories:
+        """Return the same data if there are trajectories of both labels.
+
+        Raises:
+            DataError: If one label is missing, so that there is nothing to tell apart.
+        """
+        if self.positives == 0 or self.negatives == 0:
+            missing = 1 if self.positives == 0 else -1
+            raise DataError(f"no trajectory has label {missing}; give trajectories of both labels, 1 and -1")
+        return self
+
+    def select(self, mask: NDArray[Any]) -> LabelledTrajectories:
+        """The trajectories where a mask (or an index array) selects.
+
+        Raises:
+            DataError: If none is selected.
+        """
+        rows = np.arange(len(self))[np.asarray(mask)]
+        ids = tuple(self.ids[row] for row in rows)
+        return LabelledTrajectories(self.values[rows], self.lengths[rows], self.labels[rows], self.variables, ids)
+
+    def drop_last(self, mask: NDArray[np.bool_]) -> LabelledTrajectories:
+        """The same data without the last state of the trajectories where ``mask`` is true (Case Study 2).
+
+        Raises:
+            DataError: If a trajectory would have no state left.
+        """
+        lengths = self.lengths - np.asarray(mask, dtype=bool)
+        return LabelledTrajectories(self.values, lengths, self.labels, self.variables, self.ids)
+
+
+def _real(array: ArrayLike, what: str) -> NDArray[np.float64]:
+    try:
+        return np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise DataError(f"{what} are not numbers of one shape; use a float array") from None
+
+
+def _padded(arrays: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    rows = [_real(array, f"the states of trajectory {index}") for index, array in enumerate(arrays)]
+    if not rows:
+        raise DataError("there is no trajectory; give at least one")
+    for index, row in enumerate(rows):
+        if row.ndim != 2 or row.shape[1] != rows[0].shape[-1]:
+            raise DataError(
+                f"trajectory {index} has shape {row.shape}; use (ticks, variables) with the same variables in each"
+            )
+    counts = np.array([len(row) for row in rows], dtype=np.int64)
+    values = np.full((len(rows), max(int(counts.max()), 1), rows[0].shape[1]), np.nan)
+    for index, row in enumerate(rows):
+        values[index, : len(row)] = row
+    return values, counts
+
+
+def _whole(numbers: ArrayLike, n: int, what: str) -> NDArray[np.int64]:
+    array = _real(numbers, f"the {what}s")
+    if array.shape != (n,):
+        raise DataError(f"{what}s have shape {array.shape} for {n} trajectories; give one {what} per trajectory")
+    wrong = array != np.round(array)
+    if wrong.any():
+        raise DataError(
+            f"{what} {array[_first(wrong)]} of row {_first(wrong)} is not a whole number; use whole numbers"
+        )
+    return array.astype(np.int64)
+
+
+def _first(wrong: NDArray[np.bool_]) -> int:
+    return int(np.argmax(wrong))
+
+
+def _check_lengths(lengths: NDArray[np.int64], ticks: int, ids: tuple[str, ...]) -> None:
+    wrong = (lengths < 1) | (lengths > ticks)
+    if wrong.any():
+        row = _first(wrong)
+        raise DataError(f"trajectory {ids[row]!r} has length {lengths[row]}; use 1 to {ticks} states")
+
+
+def _check_labels(labels: NDArray[np.int64], ids: tuple[str, ...]) -> None:
+    wrong = np.abs(labels) != 1
+    if wrong.any():
+        row = _first(wrong)
+        raise DataError(f"trajectory {ids[row]!r} has label {labels[row]}; use 1 or -1")
+
+
+def _check_states(
+    values: NDArray[np.float64], lengths: NDArray[np.int64], variables: tuple[str, ...], ids: tuple[str, ...]
+) -> None:
+    inside = (np.arange(values.shape[1]) < lengths[:, None])[:, :, None]
+    wrong = inside & ~np.isfinite(values)
+    if wrong.any():
+        row, tick, column = (int(index) for index in np.argwhere(wrong)[0])
+        raise DataError(
+            f"trajectory {ids[row]!r}, tick {tick}, variable {variables[column]!r} is {values[row, tick, column]}; "
+            "fill it in, or shorten the trajectory before it"
+        )
