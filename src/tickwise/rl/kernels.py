@@ -1,0 +1,219 @@
+"""The compiled loops of learning and evaluation: every formula, task and table environment runs through them.
+
+All arrays are those of `tickwise.rl.qlearning.Problem`. Learning draws a uniform number for the initial
+state, then two at each step, the first for the action and the second for the outcome; greedy play draws the
+same but for the action. The order is part of the contract, so that a plain-Python twin with the same generator
+gives the same numbers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise._jit import njit
+
+# Unsigned, so that the compiled indexing need not ask whether an index counts from the end.
+_index = np.uint32
+
+
+@njit
+def draw_state(thresholds: NDArray[np.float64], uniform: float) -> int:
+    """The initial state that a uniform number selects: the first whose threshold exceeds it."""
+    low, high = 0, len(thresholds) - 1
+    while low < high:
+        middle = (low + high) // 2
+        if thresholds[middle] > uniform:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+@njit
+def q_learning(
+    start_thresholds: NDArray[np.float64],
+    successor: NDArray[np.int32],
+    thresholds: NDArray[np.float64],
+    task_start: NDArray[np.int32],
+    task_delta: NDArray[np.int32],
+    task_letter: NDArray[np.int32],
+    reward: NDArray[np.float32],
+    final_reward: NDArray[np.float32],
+    terminated: NDArray[np.bool_],
+    horizon: int,
+    memory_start: NDArray[np.int32],
+    memory_delta: NDArray[np.int32],
+    memory_letter: NDArray[np.int32],
+    alpha: float,
+    gamma: float,
+    epsilon: float,
+    rng: np.random.Generator,
+    q: NDArray[np.float32],
+    returns: NDArray[np.float32],
+    paths: NDArray[np.int32],
+) -> None:
+    """Q-learning (Section IV-B, Step 3) with ε-greedy actions and random ties; changes ``q`` in place.
+
+    ``q`` has shape ``(memory states, states, actions)``. ``returns``, shape ``(episodes,)``, is filled with
+    the undiscounted return of each episode. ``paths``, shape ``(episodes, horizon + 1)``, is filled with the
+    MDP states of each episode and -1 after its end; shape ``(0, 0)`` records nothing. The rest is the
+    problem's arrays, the settings and the generator; see `tickwise.rl.qlearning`.
+    """
+    actions = successor.shape[1]
+    outcomes = successor.shape[2]
+    record = len(paths) > 0
+    for episode in range(len(returns)):
+        s = _index(draw_state(start_thresholds, rng.random()))
+        w = _index(task_start[s])
+        u = _index(memory_start[s])
+        total = 0.0
+        if record:
+            paths[episode, :] = -1
+            paths[episode, 0] = s
+        best = q[u, s, 0]
+        for a in range(1, actions):
+            best = max(best, q[u, s, a])
+        for t in range(1, horizon + 1):
+            # both draws at once: a call makes the registers' contents go to memory and back
+            uniform = rng.random()
+            chance = rng.random()
+            if uniform < epsilon:
+                action = _index(uniform / epsilon * actions)
+            else:
+                ties = 0
+                for a in range(actions):
+                    ties += q[u, s, a] == best
+                pick = int((uniform - epsilon) / (1.0 - epsilon) * ties)
+                action = _index(0)
+                for a in range(actions):
+                    if q[u, s, a] == best:
+                        if pick == 0:
+                            action = _index(a)
+                            break
+                        pick -= 1
+            outcome = _index(0)
+            while outcome < outcomes - 1 and chance >= thresholds[s, action, outcome]:
+                outcome = _index(outcome + 1)
+            next_s = _index(successor[s, action, outcome])
+            next_u = _index(memory_delta[u, _index(memory_letter[s, action, outcome])])
+            w = _index(task_delta[w, _index(task_letter[next_s])])
+            gained = np.float64(reward[w, next_s])
+            over = terminated[w] or t == horizon
+            if t == horizon:
+                gained += final_reward[w]
+            total += gained
+            best = q[next_u, next_s, 0]
+            for a in range(1, actions):
+                best = max(best, q[next_u, next_s, a])
+            target = gained if over else gained + gamma * best
+            updated = np.float32(q[u, s, action] + alpha * (target - q[u, s, action]))
+            q[u, s, action] = updated
+            if u == next_u and s == next_s:
+                # the update may have changed the best value of the very state that comes next
+                best = q[u, s, 0]
+                for a in range(1, actions):
+                    best = max(best, q[u, s, a])
+            s = next_s
+            u = next_u
+            if record:
+                paths[episode, t] = s
+            if over:
+                break
+        returns[episode] = total
+
+
+@njit
+def greedy_returns(
+    start_thresholds: NDArray[np.float64],
+    successor: NDArray[np.int32],
+    thresholds: NDArray[np.float64],
+    task_start: NDArray[np.int32],
+    task_delta: NDArray[np.int32],
+    task_letter: NDArray[np.int32],
+    reward: NDArray[np.float32],
+    final_reward: NDArray[np.float32],
+    terminated: NDArray[np.bool_],
+    horizon: int,
+    memory_start: NDArray[np.int32],
+    memory_delta: NDArray[np.int32],
+    memory_letter: NDArray[np.int32],
+    rng: np.random.Generator,
+    q: NDArray[np.float32],
+    returns: NDArray[np.float32],
+) -> None:
+    """Play the greedy policy, ties to the lower action; fills ``returns`` (see `q_learning`)."""
+    actions = successor.shape[1]
+    outcomes = successor.shape[2]
+    for episode in range(len(returns)):
+        s = _index(draw_state(start_thresholds, rng.random()))
+        w = _index(task_start[s])
+        u = _index(memory_start[s])
+        total = 0.0
+        for t in range(1, horizon + 1):
+            chance = rng.random()
+            action = _index(0)
+            best = q[u, s, 0]
+            for a in range(1, actions):
+                if q[u, s, a] > best:
+                    best = q[u, s, a]
+                    action = _index(a)
+            outcome = _index(0)
+            while outcome < outcomes - 1 and chance >= thresholds[s, action, outcome]:
+                outcome = _index(outcome + 1)
+            u = _index(memory_delta[u, _index(memory_letter[s, action, outcome])])
+            s = _index(successor[s, action, outcome])
+            w = _index(task_delta[w, _index(task_letter[s])])
+            gained = np.float64(reward[w, s])
+            if t == horizon:
+                gained += final_reward[w]
+            total += gained
+            if terminated[w]:
+                break
+        returns[episode] = total
+
+
+@njit
+def backward_induction(
+    successor: NDArray[np.int32],
+    probability: NDArray[np.float64],
+    task_delta: NDArray[np.int32],
+    task_letter: NDArray[np.int32],
+    reward: NDArray[np.float32],
+    final_reward: NDArray[np.float32],
+    terminated: NDArray[np.bool_],
+    horizon: int,
+    sign: float,
+) -> NDArray[np.float64]:
+    """Optimal undiscounted values at tick 0 over (task state, state), by backward induction.
+
+    ``sign`` is 1.0 for the greatest value and -1.0 for the least; the rest is arrays of the world and the
+    task, see `tickwise.rl.planning`.
+
+    Returns:
+        Values with ``horizon`` ticks to go, shape ``(task states, states)``.
+    """
+    states, actions, outcomes = successor.shape
+    values = np.zeros((len(task_delta), states))
+    arriving = np.empty_like(values)
+    for t in range(horizon, 0, -1):
+        # the value of arriving at tick t in state s with the task in w: the reward there and what follows
+        for w in range(len(task_delta)):
+            for s in range(states):
+                value = np.float64(reward[w, s])
+                if t == horizon:
+                    value += final_reward[w]
+                elif not terminated[w]:
+                    value += values[w, s]
+                arriving[w, s] = value
+        for w in range(len(task_delta)):
+            for s in range(states):
+                best = -np.inf
+                for a in range(actions):
+                    expected = 0.0
+                    for k in range(outcomes):
+                        after = successor[s, a, k]
+                        expected += probability[s, a, k] * arriving[task_delta[w, task_letter[after]], after]
+                    best = max(best, sign * expected)
+                values[w, s] = sign * best
+    return values

@@ -1,0 +1,153 @@
+"""Plain-Python twins of the compiled loops, and small random problems to run both on.
+
+The twins go by the definitions: a `TaskMonitor` follows the task, `draw` samples, and nothing is kept from
+one step for the next.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.envs.tabulate import TabularMDP, cumulative, draw
+from tickwise.envs.tasks import TaskMonitor, TaskTable
+from tickwise.rl.qlearning import Problem, QSettings
+from tickwise.rl.states import Memory
+
+
+def choose(row: NDArray[np.float32], epsilon: float, uniform: float) -> int:
+    """An ε-greedy action: one number in [0, 1) decides whether it is random, and which it is."""
+    if uniform < epsilon:
+        return int(uniform / epsilon * len(row))
+    best = [action for action in range(len(row)) if row[action] == row.max()]
+    return best[int((uniform - epsilon) / (1.0 - epsilon) * len(best))]
+
+
+def advance(problem: Problem, u: int, s: int, action: int, uniform: float) -> tuple[int, int]:
+    """The next memory state and the next state."""
+    outcome = draw(cumulative(problem.mdp.probability)[s, action], uniform)
+    letter = problem.memory.letter[s, action, outcome]
+    return int(problem.memory.delta[u, letter]), int(problem.mdp.successor[s, action, outcome])
+
+
+def slow_q_learning(
+    problem: Problem, q: NDArray[np.float32], settings: QSettings, rng: np.random.Generator, episodes: int
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Q-learning; changes ``q`` and returns what `collect` does."""
+    returns = np.zeros(episodes, dtype=np.float32)
+    paths = np.full((episodes, problem.task.horizon + 1), -1, dtype=np.int32)
+    for episode in range(episodes):
+        monitor = TaskMonitor(problem.task)
+        s = draw(cumulative(problem.mdp.initial), rng.random())
+        u = int(problem.memory.start[s])
+        monitor.start(s)
+        paths[episode, 0] = s
+        total, over = 0.0, False
+        while not over:
+            action = choose(q[u, s], settings.epsilon, rng.random())
+            next_u, next_s = advance(problem, u, s, action, rng.random())
+            reward, over = monitor.advance(next_s)
+            future = 0.0 if over else settings.gamma * float(q[next_u, next_s].max())
+            old = float(q[u, s, action])
+            q[u, s, action] = old + settings.alpha * (reward + future - old)
+            u, s = next_u, next_s
+            paths[episode, monitor.tick] = s
+            total += reward
+        returns[episode] = total
+    return returns, paths
+
+
+def slow_greedy_returns(
+    problem: Problem, q: NDArray[np.float32], rng: np.random.Generator, episodes: int
+) -> NDArray[np.float32]:
+    """Returns of the greedy policy, ties to the lower action."""
+    returns = np.zeros(episodes, dtype=np.float32)
+    for episode in range(episodes):
+        monitor = TaskMonitor(problem.task)
+        s = draw(cumulative(problem.mdp.initial), rng.random())
+        u = int(problem.memory.start[s])
+        monitor.start(s)
+        total, over = 0.0, False
+        while not over:
+            u, s = advance(problem, u, s, int(q[u, s].argmax()), rng.random())
+            reward, over = monitor.advance(s)
+            total += reward
+        returns[episode] = total
+    return returns
+
+
+def history_value(mdp: TabularMDP, task: TaskTable, sign: float = 1.0) -> float:
+    """The best (with sign -1, the worst) expected return of all policies that may use the whole history."""
+
+    def value(history: tuple[int, ...]) -> float:
+        monitor = TaskMonitor(task)
+        monitor.start(history[0])
+        gained, over = 0.0, False
+        for _, s in pairwise(history):
+            gained, over = monitor.advance(s)
+        if over:
+            return gained
+        s = history[-1]
+        expected = [
+            sum(
+                float(mdp.probability[s, action, k]) * value((*history, int(mdp.successor[s, action, k])))
+                for k in range(mdp.successor.shape[2])
+                if mdp.probability[s, action, k] > 0
+            )
+            for action in range(mdp.n_actions)
+        ]
+        return gained + (max(expected) if sign > 0 else min(expected))
+
+    return sum(float(mdp.initial[s]) * value((s,)) for s in range(mdp.n_states) if mdp.initial[s] > 0)
+
+
+def distributions(rng: np.random.Generator, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Random distributions along the last axis, with outcomes of probability zero in any place."""
+    weights = rng.random(shape) * (rng.random(shape) < 0.7)
+    weights[..., rng.integers(shape[-1])] += 0.1
+    return weights / weights.sum(axis=-1, keepdims=True)
+
+
+def random_mdp(rng: np.random.Generator, states: int, actions: int, outcomes: int) -> TabularMDP:
+    return TabularMDP(
+        successor=rng.integers(states, size=(states, actions, outcomes)),
+        probability=distributions(rng, (states, actions, outcomes)),
+        initial=distributions(rng, (states,)),
+        cell=np.arange(states),
+        cell_coordinates=rng.integers(0, 4, size=(states, 2)) + 0.5,
+        variables=("x", "y"),
+        limits=((0.0, 4.0), (0.0, 4.0)),
+    )
+
+
+def random_task(rng: np.random.Generator, states: int, horizon: int) -> TaskTable:
+    """A task with rewards at any tick and at the deadline, and with early termination."""
+    task_states, letters = rng.integers(1, 5, size=2)
+    return TaskTable(
+        delta=rng.integers(task_states, size=(task_states, letters)),
+        letter=rng.integers(letters, size=states),
+        reward=rng.normal(size=(task_states, states)),
+        final_reward=rng.choice([-10.0, 0.0, 33.3], size=task_states),
+        terminated=rng.random(task_states) < 0.2,
+        success=rng.random(task_states) < 0.5,
+        horizon=horizon,
+        stages=("",) * int(task_states),
+    )
+
+
+def random_problem(seed: int, *, states: int = 4, actions: int = 3, outcomes: int = 3, horizon: int = 6) -> Problem:
+    """A random world, task and memory; the sizes are at most those given."""
+    rng = np.random.default_rng(seed)
+    states, actions, outcomes, horizon = (
+        int(rng.integers(1, most + 1)) for most in (states, actions, outcomes, horizon)
+    )
+    memory_states, letters = rng.integers(1, 5, size=2)
+    mdp = random_mdp(rng, states, actions, outcomes)
+    memory = Memory(
+        start=rng.integers(memory_states, size=states),
+        delta=rng.integers(memory_states, size=(memory_states, letters)),
+        letter=rng.integers(letters, size=mdp.successor.shape),
+    )
+    return Problem(mdp, random_task(rng, states, horizon), memory)
