@@ -1,0 +1,119 @@
+"""Steps 1 to 3: transfer of logical structure under the hypothesis of logical transferability (Section IV-B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tickwise.automata.build import timed_automata
+from tickwise.automata.ticks import TickTable
+from tickwise.errors import NotTransferableError
+from tickwise.inference.prior import Prior
+from tickwise.inference.space import SearchSpace
+from tickwise.inference.swarm import SwarmSettings
+from tickwise.inference.template import TransferFit, fit_transferable
+from tickwise.inference.trajectories import LabelledTrajectories
+from tickwise.inference.tree import DecisionTree, InferenceSettings, infer_tree, is_satisfying
+from tickwise.logic.sdnf import SDNF
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What inference needs of one task: its labelled trajectories, prior and space of parameters."""
+
+    data: LabelledTrajectories
+    prior: Prior
+    space: SearchSpace
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """The outcome of Steps 1 and 2.
+
+    Attributes:
+        tree: The source's decision tree (Algorithm 1).
+        source: φ^S, or None where the tree has no leaf with label 1.
+        source_satisfying: Whether φ^S is a satisfying formula (Problem 1).
+        fit: The attempts of Step 2, or None where Step 1 failed.
+    """
+
+    tree: DecisionTree
+    source: SDNF | None
+    source_satisfying: bool
+    fit: TransferFit | None
+
+    @property
+    def target(self) -> SDNF | None:
+        """φ^T, or None where logical transferability was not identified."""
+        return self.fit.formula if self.fit is not None and self.fit.transferable else None
+
+    @property
+    def transferable(self) -> bool:
+        """Whether logical transferability is identified (Definition 8)."""
+        return self.target is not None
+
+    @property
+    def reason(self) -> str:
+        """Why it is or is not, in one sentence."""
+        if self.source is None:
+            return "not identified: no leaf of the source's decision tree has label 1, so there is no source formula"
+        if not self.source_satisfying:
+            return "not identified: the source's formula does not satisfy the constraints of Problem 1"
+        assert self.fit is not None  # Step 2 ran
+        return self.fit.reason
+
+
+def transfer_structure(
+    source: Task,
+    target: Task,
+    settings: InferenceSettings,
+    swarm: SwarmSettings,
+    source_rng: np.random.Generator,
+    target_rng: np.random.Generator,
+) -> Hypothesis:
+    """Infer φ^S by Algorithm 1 (Step 1), then fit a structurally transferable φ^T (Step 2).
+
+    Args:
+        source: The source task's data.
+        target: The target task's data.
+        settings: The constraints of Problem 1 and the settings of Algorithm 1.
+        swarm: The settings of the particle swarm.
+        source_rng: Draws of Step 1.
+        target_rng: Draws of Step 2.
+
+    Returns:
+        What was inferred, and whether logical transferability is identified.
+    """
+    tree = infer_tree(source.data, source.prior, source.space, settings, swarm, source_rng)
+    formula = tree.formula
+    satisfying = formula is not None and is_satisfying(formula, source.data, settings)
+    fit = None
+    if formula is not None and satisfying:
+        fit = fit_transferable(target.data, target.prior, target.space, formula, settings, swarm, target_rng)
+    return Hypothesis(tree, formula, satisfying, fit)
+
+
+def tick_tables(formula: SDNF, horizon: int, *, reduce: bool = True) -> tuple[TickTable, ...]:
+    """Step 3: the deterministic timed automata of the sequential conjunctive subformulas, compiled to tick tables.
+
+    Args:
+        formula: φ in SDNF.
+        horizon: The length L of an episode, in ticks: the greatest clock value of the unreduced valuations.
+        reduce: Hold clocks that a location does not use at 0; False keeps the paper's full valuations.
+
+    Returns:
+        One table a disjunct.
+    """
+    return tuple(automaton.compile(horizon, reduce=reduce) for automaton in timed_automata(formula))
+
+
+def require_transferable(hypothesis: Hypothesis) -> tuple[SDNF, SDNF]:
+    """φ^S and φ^T where logical transferability is identified.
+
+    Raises:
+        NotTransferableError: Where it is not, with the reason.
+    """
+    if hypothesis.source is None or hypothesis.target is None:
+        raise NotTransferableError(f"logical transferability is {hypothesis.reason}")
+    return hypothesis.source, hypothesis.target

@@ -1,0 +1,154 @@
+"""Algorithm 2: the transfer of extended Q-functions based on logical transferability."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.automata.mapping import Bijections, bijections
+from tickwise.automata.ticks import TickTable
+from tickwise.envs.tabulate import TabularMDP
+from tickwise.errors import DataError
+from tickwise.logic.sdnf import Primitive
+from tickwise.logic.semantics import holds
+from tickwise.rl.states import Memory
+
+
+def transfer_q(
+    source_mdp: TabularMDP,
+    source_memory: Memory,
+    source_q: NDArray[np.float32],
+    target_mdp: TabularMDP,
+    target_memory: Memory,
+    initial: float,
+) -> NDArray[np.float32]:
+    """Transfer an extended Q-function from the source to the target task (Algorithm 2).
+
+    Args:
+        source_mdp: The source's world.
+        source_memory: The source's extended states, made of the tick tables of φ^S.
+        source_q: Q̄^S*, shape ``(source memory states, source states, actions)``.
+        target_mdp: The target's world; it has the source's actions.
+        target_memory: The target's extended states, made of the tick tables of φ^T.
+        initial: The value of table states that no episode learns in (the start, before the first letter).
+
+    Returns:
+        Q̄^T, shape ``(target memory states, target states, actions)``.
+
+    Raises:
+        DataError: If the worlds' actions or orientations differ, or a memory is not one of extended states.
+        AutomatonError: If φ^T is not structurally transferable from φ^S.
+    """
+    _check(source_mdp, source_memory, source_q, target_mdp, target_memory)
+    shape = (target_memory.n_states, target_mdp.n_states, target_mdp.n_actions)
+    target_q = np.full(shape, initial, dtype=np.float32)
+    for i, target in enumerate(target_memory.tables):  # line 2
+        i_hat = i % len(source_memory.tables)  # line 4
+        source = source_memory.tables[i_hat]
+        xi = bijections(target.automaton, source.automaton)
+        states = [
+            similar_states(source_mdp, rho_source, target_mdp, rho_target)
+            for rho_source, rho_target in zip(
+                source.automaton.conjunction.primitives, target.automaton.conjunction.primitives, strict=True
+            )
+        ]
+        similar_u = similar_valuations(source, target, xi)
+        for u in range(1, len(target)):  # lines 2 and 8: every location and valuation
+            j = target.stage[u]  # line 3: the primitive that is still to be satisfied; ξ_Σ is by position (line 5)
+            learned = source_q[source_memory.offsets[i_hat] + similar_u[u]]
+            target_q[target_memory.offsets[i] + u] = learned[states[j]]  # line 12
+    return target_q
+
+
+def similar_states(
+    source_mdp: TabularMDP, source: Primitive, target_mdp: TabularMDP, target: Primitive
+) -> NDArray[np.int64]:
+    """Line 6: for each target state the source state that lies most alike relative to the region's centroid.
+
+    A state's orientation in its cell is kept. Of source states at the same distance, one in which the predicate
+    has the truth value that it has in the target state comes first, then the lower number: the paper leaves ties
+    open, and without this rule a cell beside a region could be likened to one within it.
+
+    Args:
+        source_mdp: The source's world.
+        source: The primitive with ρ^S.
+        target_mdp: The target's world.
+        target: The primitive with ρ^{j,T}.
+
+    Returns:
+        Source states, shape ``(target states,)``.
+    """
+    source_cells, target_cells = source_mdp.cell_coordinates, target_mdp.cell_coordinates
+    source_relative = source_cells - source.box.centroid(source_mdp.variables, source_mdp.limits)
+    target_relative = target_cells - target.box.centroid(target_mdp.variables, target_mdp.limits)
+    distance = ((target_relative[:, None, :] - source_relative[None, :, :]) ** 2).sum(axis=2)
+    differs = (
+        holds(target.predicate, target_cells, target_mdp.variables)[:, None]
+        != holds(source.predicate, source_cells, source_mdp.variables)[None, :]
+    )
+    # distances between grid points differ by far more than rounding does
+    rank = np.lexsort((differs, np.round(distance, 9)), axis=1)
+    nearest = rank[:, 0]
+    return _members(source_mdp)[nearest[target_mdp.cell], _orientation(target_mdp)]
+
+
+def similar_valuations(source: TickTable, target: TickTable, xi: Bijections) -> NDArray[np.int64]:
+    """Lines 7 to 11: for each target table state the source's in location ξ_Q(q) with the nearest clock values.
+
+    Every clock's value is brought as near as it can be; where the nearest values of two clocks do not occur
+    together in the location, the valuation with the least sum of squared differences is taken.
+
+    Args:
+        source: The tick table of φ_î^S.
+        target: The tick table of φ_i^T.
+        xi: The bijections between their automata.
+
+    Returns:
+        Source table states, shape ``(target table states,)``; 0 for the start.
+    """
+    similar = np.zeros(len(target), dtype=np.int64)
+    numbers = np.arange(1, len(source))
+    for u in range(1, len(target)):
+        there = numbers[source.location[1:] == xi.locations[target.location[u]]]  # line 7
+        values = source.clocks[there][:, xi.clocks].astype(np.int64)  # line 9
+        distance = ((values - target.clocks[u].astype(np.int64)) ** 2).sum(axis=1)
+        similar[u] = there[distance.argmin()]  # line 10
+    return similar
+
+
+def _check(
+    source_mdp: TabularMDP,
+    source_memory: Memory,
+    source_q: NDArray[np.float32],
+    target_mdp: TabularMDP,
+    target_memory: Memory,
+) -> None:
+    if not (source_memory.tables and target_memory.tables):
+        raise DataError("extended Q-functions need memories made of timed automata; use automaton_memory")
+    if source_mdp.n_actions != target_mdp.n_actions:
+        raise DataError(
+            f"the source has {source_mdp.n_actions} actions and the target {target_mdp.n_actions}; "
+            "transfer needs the same set of actions"
+        )
+    wanted = (source_memory.n_states, source_mdp.n_states, source_mdp.n_actions)
+    if source_q.shape != wanted:
+        raise DataError(f"the source's Q-function has shape {source_q.shape}; use {wanted}")
+    if _members(source_mdp).shape[1] != _members(target_mdp).shape[1]:
+        raise DataError("the worlds have different numbers of orientations in a cell; transfer needs the same")
+
+
+def _orientation(mdp: TabularMDP) -> NDArray[np.int64]:
+    """The number of each state among those of its cell, such as its heading."""
+    order = np.argsort(mdp.cell, kind="stable")
+    first = np.searchsorted(mdp.cell[order], np.arange(mdp.n_cells))
+    orientation = np.empty(mdp.n_states, dtype=np.int64)
+    orientation[order] = np.arange(mdp.n_states) - first[mdp.cell[order]]
+    return orientation
+
+
+def _members(mdp: TabularMDP) -> NDArray[np.int64]:
+    """The states of each cell in order, shape ``(cells, orientations)``."""
+    counts = np.bincount(mdp.cell, minlength=mdp.n_cells)
+    if (counts != counts[0]).any():
+        raise DataError("the cells have different numbers of states; transfer needs the same in each")
+    return np.argsort(mdp.cell, kind="stable").reshape(mdp.n_cells, counts[0])

@@ -1,0 +1,82 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tickwise.errors import NotTransferableError
+from tickwise.inference.prior import BoxPrior
+from tickwise.inference.space import SearchSpace
+from tickwise.inference.swarm import SwarmSettings
+from tickwise.inference.trajectories import LabelledTrajectories
+from tickwise.inference.tree import InferenceSettings
+from tickwise.logic.parse import parse
+from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.structure import structurally_transferable
+from tickwise.transfer.hypothesis import Task, require_transferable, tick_tables, transfer_structure
+
+TICKS = 12
+SWARM = SwarmSettings(particles=30, iterations=40, restarts=1)
+
+
+def task(rng: np.random.Generator, rule: str, n: int = 60, wanted: int = 25) -> Task:
+    """Random walks on a line of ten cells, labelled by a rule; at least ``wanted`` of each label."""
+    phi = parse(rule)
+    found: dict[int, list[np.ndarray]] = {1: [], -1: []}
+    while min(map(len, found.values())) < wanted:
+        steps = rng.integers(-2, 3, size=(n, TICKS))
+        start = rng.integers(0, 10, size=(n, 1))
+        walks = np.clip(np.concatenate([start, start + np.cumsum(steps, axis=1)], axis=1), 0, 9) + 0.5
+        for walk, verdict in zip(walks, np.atleast_1d(phi.verdict(walks[..., None])), strict=True):
+            found[int(verdict)].append(walk[:, None])
+    X = [walk for label in (1, -1) for walk in found[label][:wanted]]
+    y = [label for label in (1, -1) for _ in range(wanted)]
+    data = LabelledTrajectories.from_arrays(np.array(X), np.array(y), ("x",))
+    return Task(data, BoxPrior({"x": (0.0, 10.0)}, TICKS), SearchSpace.grid(10, TICKS, ("x",)))
+
+
+def outcome(source: Task, target: Task, settings: InferenceSettings):
+    rngs = np.random.default_rng(1), np.random.default_rng(2)
+    return transfer_structure(source, target, settings, SWARM, *rngs)
+
+
+def test_similar_tasks_are_identified_as_transferable():
+    rng = np.random.default_rng(0)
+    settings = InferenceSettings(size=2, depth=1)
+    found = outcome(task(rng, "F[1,10] (7 <= x <= 8)"), task(rng, "F[2,11] (1 <= x <= 2)"), settings)
+    assert found.transferable, found.reason
+    source, target = require_transferable(found)
+    assert structurally_transferable(target, source)
+    assert found.source_satisfying
+    assert found.fit is not None
+    assert found.fit.attempts[-1].satisfying
+
+
+def test_tasks_that_are_not_similar_are_refused_with_the_reason():
+    rng = np.random.default_rng(3)
+    # a size of one leaves room for a single primitive, and the target's rule is no ◇
+    settings = InferenceSettings(size=1, depth=1, rate=1.0)
+    found = outcome(task(rng, "F[1,10] (7 <= x <= 8)"), task(rng, "G[3,5] (2 <= x <= 8) & F[9,12] (x >= 7)"), settings)
+    assert found.source is not None
+    assert not found.transferable
+    assert found.target is None
+    assert found.reason.startswith("not identified") or "not" in found.reason
+    with pytest.raises(NotTransferableError, match="not"):
+        require_transferable(found)
+
+
+def test_a_source_without_a_satisfying_formula_ends_at_step_1():
+    rng = np.random.default_rng(4)
+    noise = task(rng, "F[1,10] (7 <= x <= 8)")
+    labels = rng.permuted(noise.data.labels)
+    data = LabelledTrajectories(noise.data.values, noise.data.lengths, labels, noise.data.variables, noise.data.ids)
+    found = outcome(Task(data, noise.prior, noise.space), noise, InferenceSettings(depth=1, rate=0.99))
+    assert not found.transferable
+    assert found.fit is None
+    assert "source" in found.reason
+
+
+def test_tick_tables_are_one_for_each_disjunct_and_may_keep_full_valuations():
+    formula = to_sdnf(parse("(F[0,3] G[0,2] (x >= 1)) | (F[1,4] G[0,2] (x <= 0))"))
+    reduced, full = tick_tables(formula, 10), tick_tables(formula, 10, reduce=False)
+    assert len(reduced) == len(full) == 2
+    assert all(len(few) < len(many) for few, many in zip(reduced, full, strict=True))
