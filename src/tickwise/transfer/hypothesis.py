@@ -57,9 +57,9 @@ class Hypothesis:
     def reason(self) -> str:
         """Why it is or is not, in one sentence."""
         if self.source is None:
-            return "not identified: no leaf of the source's decision tree has label 1, so there is no source formula"
+            return "Logical transferability is not identified: no leaf of the source's decision tree has label 1."
         if not self.source_satisfying:
-            return "not identified: the source's formula does not satisfy the constraints of Problem 1"
+            return "Logical transferability is not identified: the source's formula violates a constraint of Problem 1."
         assert self.fit is not None  # Step 2 ran
         return self.fit.reason
 
@@ -115,5 +115,5 @@ def require_transferable(hypothesis: Hypothesis) -> tuple[SDNF, SDNF]:
         NotTransferableError: Where it is not, with the reason.
     """
     if hypothesis.source is None or hypothesis.target is None:
-        raise NotTransferableError(f"logical transferability is {hypothesis.reason}")
+        raise NotTransferableError(hypothesis.reason)
     return hypothesis.source, hypothesis.target
