@@ -1,4 +1,5 @@
 import sys
+import zipfile
 
 import numpy as np
 import pandas as pd
@@ -6,6 +7,7 @@ import pytest
 
 from tickwise.errors import DataError, MissingExtraError, MissingFileError
 from tickwise.inference.reading import read_trajectories, write_npz
+from tickwise.inference.space import SearchSpace
 from tickwise.inference.trajectories import LabelledTrajectories
 
 TABLE = """trajectory,tick,x,y,label
@@ -130,3 +132,74 @@ def test_csv_of_bytes(tmp_path):
     file.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(DataError, match="not a CSV file in UTF-8"):
         read_trajectories(file)
+
+
+def saved(**arrays):
+    """Writes an archive of correct arrays, but for those given."""
+    good = {"X": np.zeros((2, 3, 1)), "y": [1, -1], "names": ["x"]}
+    return lambda file: np.savez(file, **(good | arrays))
+
+
+def one_array(file):
+    with file.open("wb") as stream:
+        np.save(stream, np.zeros((2, 3, 1)))
+
+
+def damaged(file):
+    np.savez_compressed(file, X=np.arange(600.0).reshape(2, 300, 1), y=[1, -1], names=["x"])
+    content = bytearray(file.read_bytes())
+    content[200:260] = bytes(60)
+    file.write_bytes(content)
+
+
+def bytes_for_x(file):
+    with zipfile.ZipFile(file, "w") as archive:
+        for name in ("X", "y", "names"):
+            archive.writestr(name, b"text")
+
+
+SAVEZ = r"; write X, y and names with numpy\.savez$"
+
+
+@pytest.mark.parametrize(
+    ("write", "message"),
+    [
+        (lambda file: file.touch(), rf"not an npz file of plain arrays: .+{SAVEZ}"),
+        (lambda file: file.write_bytes(b"PK\x03\x04 nonsense"), rf"not an npz file of plain arrays: .+{SAVEZ}"),
+        (one_array, rf"not an npz file of plain arrays: it is one array alone{SAVEZ}"),
+        (damaged, rf"not an npz file of plain arrays: .+{SAVEZ}"),
+        (saved(X=np.array([{"a": 1}], dtype=object)), rf"arrays: Object arrays cannot be loaded .+{SAVEZ}"),
+        (saved(y=np.array([1, -1], dtype=object)), rf"arrays: Object arrays cannot be loaded .+{SAVEZ}"),
+        (bytes_for_x, r"'names' has shape \(\); use a list of texts"),
+        (saved(X=1.0), r"values have shape \(\); use \(trajectories, ticks, variables\)"),
+        (saved(X=np.zeros(2)), r"values have shape \(2,\); use \(trajectories"),
+        (saved(X=np.zeros((2, 3))), r"values have shape \(2, 3\); use \(trajectories"),
+        (saved(X=np.zeros((2, 3, 1, 1))), r"values have shape \(2, 3, 1, 1\); use \(trajectories"),
+        (saved(X=np.zeros((2, 3, 1)) + 2j), r"the values are not real numbers of one shape; use a float array"),
+        (saved(X=np.full((2, 3, 1), "1")), r"the values are not real numbers of one shape; use a float array"),
+        (saved(y=np.array([1j, -1j])), r"the labels are not real numbers of one shape; use a float array"),
+        (saved(y=1), r"labels have shape \(\) for 2 trajectories; give one label per trajectory"),
+        (saved(y=[1, np.inf]), r"label inf of row 1 is not a whole number; use whole numbers"),
+        (saved(lengths=3), r"lengths have shape \(\) for 2 trajectories; give one length per trajectory"),
+        (saved(names="x"), r"'names' has shape \(\); use a list of texts"),
+        (saved(names=[["x"]]), r"'names' has shape \(1, 1\); use a list of texts"),
+        (saved(ids="a"), r"'ids' has shape \(\); use a list of texts"),
+    ],
+)
+@pytest.mark.parametrize("labelled", [True, False])
+def test_npz_errors_are_one_line(tmp_path, write, message, labelled):
+    file = tmp_path / "data.npz"
+    write(file)
+    with pytest.raises(DataError, match=message) as caught:
+        read_trajectories(file, labelled=labelled)
+    assert str(file) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_trajectories_of_one_tick_hold_no_window(tmp_path):
+    file = tmp_path / "data.npz"
+    np.savez(file, X=np.zeros((2, 1, 1)), y=[1, -1], names=["x"])
+    data = read_trajectories(file)
+    with pytest.raises(DataError, match="every trajectory has a single tick; give trajectories of two ticks or more"):
+        SearchSpace.from_data(data)
+    assert SearchSpace.from_data(data, horizon=5).horizon == 5

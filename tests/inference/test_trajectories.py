@@ -65,7 +65,7 @@ def test_select_and_drop_last():
         (np.zeros((2, 3, 1)), [1, -1], {"ids": ["k", "k"]}, r"trajectory id 'k' occurs twice"),
         (np.zeros((2, 3, 1)), [1, -1], {"ids": ["k"]}, r"2 trajectories but 1 ids"),
         ([np.zeros((2, 1)), np.zeros((2, 2))], [1, -1], {}, r"trajectory 1 has shape \(2, 2\)"),
-        ([["a"]], [1], {}, r"are not numbers"),
+        ([["a"]], [1], {}, r"are not real numbers"),
         ([np.zeros((2, 1))], [1], {"lengths": [3]}, r"leave lengths out"),
     ],
 )

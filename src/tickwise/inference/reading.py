@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import zlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 from zipfile import BadZipFile
 
@@ -64,15 +66,14 @@ def write_npz(path: str | Path, data: LabelledTrajectories) -> None:
 
 
 def _read_npz(file: Path, labelled: bool) -> LabelledTrajectories:
-    try:
-        with np.load(file, allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
-    except (ValueError, OSError, BadZipFile) as error:
-        raise DataError(f"{file} is not an npz file of plain arrays: {error}") from None
+    arrays = _load_arrays(file)
     needed = ("X", "names", "y") if labelled else ("X", "names")
     for name in needed:
         if name not in arrays:
             raise DataError(f"{file} has no array {name!r}; it has {', '.join(arrays) or 'none'}")
+    for name in ("names", "ids"):
+        if name in arrays and arrays[name].ndim != 1:
+            raise DataError(f"{file}: {name!r} has shape {arrays[name].shape}; use a list of texts")
     labels = arrays.get("y", np.ones(len(np.atleast_1d(arrays["X"])), dtype=np.int8))
     names, ids = [str(name) for name in arrays["names"]], arrays.get("ids")
     try:
@@ -81,6 +82,22 @@ def _read_npz(file: Path, labelled: bool) -> LabelledTrajectories:
         )
     except DataError as error:
         raise DataError(f"{file}: {error}") from None
+
+
+def _load_arrays(file: Path) -> dict[str, NDArray[Any]]:
+    try:
+        with file.open("rb") as stream:  # np.load itself would leave a damaged file open
+            archive = np.load(stream, allow_pickle=False)
+            if isinstance(archive, np.ndarray):
+                raise ValueError("it is one array alone")
+            with archive:
+                return {name: np.asarray(archive[name]) for name in archive.files}
+    # a damaged archive may fail in any of these ways; RuntimeError is that of an encrypted or unknown one
+    except (ValueError, OSError, EOFError, RuntimeError, BadZipFile, zlib.error, TokenError) as error:
+        reason = "".join(str(error).splitlines()[:1])
+        raise DataError(
+            f"{file} is not an npz file of plain arrays: {reason}; write X, y and names with numpy.savez"
+        ) from None
 
 
 def _read_csv(file: Path, labelled: bool) -> LabelledTrajectories:

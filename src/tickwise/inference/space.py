@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise._jit import njit
-from tickwise.errors import ConfigurationError, UnknownVariableError
+from tickwise.errors import ConfigurationError, DataError, UnknownVariableError
 from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.sdnf import SDNF, Operator, Primitive, SequentialConjunction
@@ -82,7 +82,13 @@ class SearchSpace:
 
     @classmethod
     def from_data(cls, data: LabelledTrajectories, horizon: int | None = None) -> SearchSpace:
-        """Continuous boxes over the range of the data; the horizon is the data's last tick if left out."""
+        """Continuous boxes over the range of the data; the horizon is the data's last tick if left out.
+
+        Raises:
+            DataError: If the horizon is left out and no trajectory has a second tick.
+        """
+        if horizon is None and data.horizon < 1:
+            raise DataError("every trajectory has a single tick; give trajectories of two ticks or more")
         ranges = []
         for column in range(len(data.variables)):
             low, high = float(np.nanmin(data.values[..., column])), float(np.nanmax(data.values[..., column]))

@@ -37,9 +37,7 @@ class LabelledTrajectories:
     ids: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        values = _real(self.values, "the values").copy()
-        if values.ndim != 3:
-            raise DataError(f"values have shape {values.shape}; use (trajectories, ticks, variables)")
+        values = _states(self.values).copy()
         n, ticks, width = values.shape
         if n == 0 or ticks == 0:
             raise DataError(f"values have shape {values.shape}: give at least one trajectory of at least one tick")
@@ -89,8 +87,8 @@ class LabelledTrajectories:
             DataError: As the class, or if the arrays of a list do not fit together or come with ``lengths``.
         """
         if isinstance(X, np.ndarray):
-            values = X
-            counts: ArrayLike = np.full(len(X), X.shape[1] if X.ndim > 1 else 0) if lengths is None else lengths
+            values = _states(X)
+            counts: ArrayLike = np.full(len(values), values.shape[1]) if lengths is None else lengths
         else:
             values, counts = _padded(X)
             if lengths is not None:
@@ -98,8 +96,7 @@ class LabelledTrajectories:
                 if given.shape != np.shape(counts) or (given > counts).any():
                     raise DataError("lengths go beyond the listed arrays; leave lengths out for a list of arrays")
                 counts = given
-        width = values.shape[2] if values.ndim == 3 else 0
-        names = tuple(f"x{column}" for column in range(width)) if variables is None else tuple(variables)
+        names = tuple(f"x{column}" for column in range(values.shape[2])) if variables is None else tuple(variables)
         labels = tuple(str(number) for number in range(len(values))) if ids is None else tuple(ids)
         return cls(values, np.asarray(counts), np.asarray(y), names, labels)
 
@@ -154,9 +151,19 @@ class LabelledTrajectories:
 
 def _real(array: ArrayLike, what: str) -> NDArray[np.float64]:
     try:
-        return np.asarray(array, dtype=np.float64)
+        found = np.asarray(array)
+        if found.dtype.kind in "biufO":  # NumPy would cut complex numbers and read texts and dates as numbers
+            return found.astype(np.float64, copy=False)
     except (TypeError, ValueError):
-        raise DataError(f"{what} are not numbers of one shape; use a float array") from None
+        pass
+    raise DataError(f"{what} are not real numbers of one shape; use a float array")
+
+
+def _states(array: ArrayLike) -> NDArray[np.float64]:
+    values = _real(array, "the values")
+    if values.ndim != 3:
+        raise DataError(f"values have shape {values.shape}; use (trajectories, ticks, variables)")
+    return values
 
 
 def _padded(arrays: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -179,7 +186,7 @@ def _whole(numbers: ArrayLike, n: int, what: str) -> NDArray[np.int64]:
     array = _real(numbers, f"the {what}s")
     if array.shape != (n,):
         raise DataError(f"{what}s have shape {array.shape} for {n} trajectories; give one {what} per trajectory")
-    wrong = array != np.round(array)
+    wrong = ~np.isfinite(array) | (array != np.round(array))
     if wrong.any():
         raise DataError(
             f"{what} {array[_first(wrong)]} of row {_first(wrong)} is not a whole number; use whole numbers"
