@@ -1,0 +1,135 @@
+"""Learning curves: the counterpart of the paper's figures of learning results, left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, NullLocator
+from numpy.typing import NDArray
+
+from tickwise.experiments.case_studies import StudySpec
+from tickwise.experiments.figures.style import GREEN, METHODS, canvas
+
+_SHOWN = 50_000
+_BINS = 100
+_BINS_A_DECADE = 12
+_RESAMPLES = 2_000
+
+Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Episodes, shape ``(points,)``, and the runs' returns there, shape ``(runs, points)``."""
+
+
+def draw(results: Mapping[str, Any], spec: StudySpec) -> Figure | None:
+    """Returns in training over the first 50,000 episodes, and of the greedy policy over all on a log axis."""
+    methods = {name: results["methods"][name] for name in METHODS if results["methods"].get(name)}
+    if not methods:
+        return None
+    figure = canvas(4.6)
+    left = figure.add_axes((0.07, 0.235, 0.40, 0.675))
+    right = figure.add_axes((0.575, 0.235, 0.41, 0.675), sharey=left)
+    for name, runs in methods.items():
+        _band(left, name, training_curve(runs, spec.learning.block))
+        _band(right, name, evaluation_curve(runs))
+    for axes in (left, right):
+        _optimum(axes, results["summary"]["v_star"])
+        axes.grid(True)
+        axes.set_ylim(results["summary"]["fail"] - 4, results["summary"]["v_star"] * 1.1)
+    left.set(
+        xlim=(0, _SHOWN),
+        xlabel="episodes (thousands)",
+        ylabel=f"mean return of {spec.learning.block} episodes",
+    )
+    left.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 1000:g}"))
+    left.set_title("Training")
+    right.set(xscale="log", xlabel="episodes (log scale)", ylabel="mean return of the greedy policy")
+    right.xaxis.set_major_formatter(FuncFormatter(lambda value, _: short(value)))
+    right.xaxis.set_minor_locator(NullLocator())
+    right.set_title("Greedy policy")
+    _legend(figure, list(methods))
+    return figure
+
+
+def training_curve(runs: Sequence[Mapping[str, Any]], block: int) -> Curve:
+    """Returns in the first 50,000 training episodes, averaged over bins of whole blocks."""
+    count = min(_SHOWN // block, *(len(run["blocks"]) for run in runs))
+    width = max(1, _SHOWN // block // _BINS)
+    bins = max(1, count // width)
+    episodes = np.asarray((np.arange(bins) + 0.5) * width * block, dtype=np.float64)
+    rows = np.stack([np.asarray(run["blocks"][:count], dtype=np.float64) for run in runs])
+    usable = rows[:, : bins * width] if count >= width else rows
+    returns: NDArray[np.float64] = usable.reshape(len(runs), bins, -1).mean(axis=2)
+    return episodes, returns
+
+
+def evaluation_curve(runs: Sequence[Mapping[str, Any]]) -> Curve:
+    """Returns of the greedy policy, averaged over equal bins of a log axis, as far as all runs go."""
+    shortest = min(runs, key=lambda run: len(run["evaluation_episodes"]))
+    episodes = np.asarray(shortest["evaluation_episodes"], dtype=np.float64)
+    rows = np.stack([np.asarray(run["evaluation_returns"][: len(episodes)], dtype=np.float64) for run in runs])
+    later = episodes > 0  # a log axis has no 0
+    episodes, rows = episodes[later], rows[:, later]
+    number = np.floor(np.log10(episodes) * _BINS_A_DECADE)
+    groups = [np.flatnonzero(number == value) for value in np.unique(number)]
+    middles = np.array([episodes[group].mean() for group in groups])
+    returns = [rows[:, group].mean(axis=1) for group in groups]
+    return middles, np.stack(returns, axis=1) if returns else np.empty((len(runs), 0))
+
+
+def interval(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The 95 % percentile bootstrap interval of the mean over runs, from ``(runs, points)`` to ``(points,)``."""
+    draws = np.random.default_rng(0).integers(len(rows), size=(_RESAMPLES, len(rows)))
+    share = np.stack([(draws == run).mean(axis=1) for run in range(len(rows))], axis=1)
+    low, high = np.percentile(share @ rows, [2.5, 97.5], axis=0)
+    return low, high
+
+
+def short(value: float) -> str:
+    """A number of episodes in few signs, for instance ``2M`` or ``10k``."""
+    if value >= 1_000_000:
+        return f"{value / 1_000_000:g}M"
+    return f"{value / 1000:g}k" if value >= 1000 else f"{value:g}"
+
+
+def _band(axes: Axes, name: str, curve: Curve) -> None:
+    look = METHODS[name]
+    episodes, rows = curve
+    axes.plot(
+        episodes, rows.mean(axis=0), color=look.colour, linestyle=look.line, linewidth=1.9, zorder=3,
+        marker=look.marker, markersize=5, markevery=max(1, len(episodes) // 9), markeredgecolor="white",
+        markeredgewidth=0.6,
+    )  # fmt: skip
+    if len(rows) > 1 and rows.shape[1]:
+        low, high = interval(rows)
+        axes.fill_between(episodes, low, high, color=look.colour, alpha=0.16, linewidth=0, zorder=2)
+
+
+def _optimum(axes: Axes, value: float) -> None:
+    axes.axhline(value, color=GREEN, linewidth=1.4, linestyle=(0, (2, 1.5)), zorder=1)
+    axes.annotate(
+        f"optimum $V^*$ = {value:.1f}", (0.985, value), xycoords=("axes fraction", "data"), xytext=(0, 3),
+        textcoords="offset points", ha="right", va="bottom", color="#00694C", fontsize=9.5,
+    )  # fmt: skip
+
+
+def _legend(figure: Figure, names: Sequence[str]) -> None:
+    handles = [
+        Line2D(
+            [],
+            [],
+            color=look.colour,
+            linestyle=look.line,
+            marker=look.marker,
+            markersize=5.5,
+            linewidth=1.9,
+            markeredgecolor="white",
+            label=f"{name}: {look.meaning}",
+        )
+        for name, look in METHODS.items()
+        if name in names
+    ]
+    figure.legend(handles=handles, loc="lower center", ncols=4, columnspacing=1.6, handlelength=3.2)

@@ -1,0 +1,110 @@
+"""When a method has converged, and what can be said of it over the runs (Section V)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import bootstrap, trim_mean
+
+LEVELS = (80, 90, 95)
+"""Shares, in percent, of the way from the always-fail return to V*."""
+
+
+def first_block(blocks: NDArray[np.float32], optimum: float, block: int) -> int | None:
+    """Episodes until the end of the first block of training episodes whose mean return is the optimum.
+
+    The measure nearest to the paper's curves, which are "averaged for every 10 episodes".
+
+    Args:
+        blocks: Mean return of each block, shape ``(blocks,)``.
+        optimum: The optimal value V*.
+        block: Episodes of a block.
+
+    Returns:
+        Episodes, or None where there is no such block.
+    """
+    there = np.flatnonzero(blocks >= optimum)
+    return int(there[0] + 1) * block if len(there) else None
+
+
+def reached(episodes: NDArray[np.int64], returns: NDArray[np.float64], threshold: float) -> int | None:
+    """The episodes of learning before the first evaluation with at least the threshold; None if there is none."""
+    there = np.flatnonzero(returns >= threshold)
+    return int(episodes[there[0]]) if len(there) else None
+
+
+def stays(episodes: NDArray[np.int64], returns: NDArray[np.float64], threshold: float) -> int | None:
+    """The episodes before the evaluation from which on all have at least the threshold; None if the last has not."""
+    below = np.flatnonzero(returns < threshold)
+    first = int(below[-1]) + 1 if len(below) else 0
+    return int(episodes[first]) if first < len(episodes) else None
+
+
+def episode_statistics(values: Sequence[int | None], seed: int) -> dict[str, Any]:
+    """Mean, median and the mean's bootstrap interval of episodes to convergence.
+
+    Args:
+        values: Episodes of each run, None where a run did not get there.
+        seed: The seed of the bootstrap.
+
+    Returns:
+        ``mean``, ``low`` and ``high`` (95 %), which are None unless all runs got there; ``median``, None unless more
+        than half did; and ``reached``, the number of runs that did.
+    """
+    numbers = np.array([np.inf if value is None else value for value in values], dtype=np.float64)
+    median = float(np.median(numbers)) if np.isfinite(numbers).sum() * 2 > len(numbers) else None
+    result: dict[str, Any] = {"mean": None, "low": None, "high": None, "median": median}
+    if np.isfinite(numbers).all() and len(numbers):
+        result["mean"] = float(numbers.mean())
+        result["low"], result["high"] = _interval(numbers, np.mean, seed)
+    return {**result, "reached": int(np.isfinite(numbers).sum())}
+
+
+def return_statistics(values: Sequence[float], seed: int) -> dict[str, float]:
+    """The runs' mean returns together.
+
+    Args:
+        values: The mean return of each run, at least one.
+        seed: The seed of the bootstrap.
+
+    Returns:
+        ``iqm``, the interquartile mean, and its 95 % bootstrap interval, ``low`` and ``high``.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    low, high = _interval(numbers, _interquartile_mean, seed)
+    return {"iqm": float(_interquartile_mean(numbers)), "low": low, "high": high}
+
+
+def ratio(slow: Sequence[int | None], fast: Sequence[int | None], limit: int) -> dict[str, Any]:
+    """How many times fewer episodes the fast method needs, by the means over the runs.
+
+    Args:
+        slow: Episodes of each run of the slow method; None counts as the limit, which makes the ratio a lower bound.
+        fast: Episodes of each run of the fast method; 0 counts as 1.
+        limit: The most episodes that the slow method learned for.
+
+    Returns:
+        ``value``, None where a run of the fast method did not get there or there is no run, and ``at_least``.
+    """
+    at_least = any(value is None for value in slow)
+    there = [max(value, 1) for value in fast if value is not None]
+    if not slow or not fast or len(there) < len(fast):
+        return {"value": None, "at_least": at_least}
+    numerator = np.mean([limit if value is None else value for value in slow])
+    return {"value": float(numerator / np.mean(there)), "at_least": at_least}
+
+
+def _interquartile_mean(values: NDArray[np.float64], axis: int = -1) -> Any:
+    return trim_mean(values, 0.25, axis=axis)
+
+
+def _interval(values: NDArray[np.float64], statistic: Any, seed: int) -> tuple[float, float]:
+    """The 95 % percentile bootstrap interval of a statistic."""
+    if np.ptp(values) == 0:  # one run, or all the same
+        return float(values[0]), float(values[0])
+    rng = np.random.default_rng(seed)
+    found = bootstrap((values,), statistic, method="percentile", rng=rng, n_resamples=4999)
+    return float(found.confidence_interval.low), float(found.confidence_interval.high)

@@ -1,0 +1,258 @@
+"""The report of a study: one self-contained page that says what was found, beside what the paper says."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from tickwise.envs.catalog import EnvironmentSpec
+from tickwise.experiments.captions import captions
+from tickwise.experiments.case_studies import StudySpec
+from tickwise.experiments.choices import choices, first_block_measure, signed
+from tickwise.experiments.regions import NamedFormula, overlap, ranges_text, read_formula
+from tickwise.experiments.verdict import count, verdict
+from tickwise.logic.render import to_english, to_unicode
+from tickwise.logic.syntax import Bound, Box
+
+FORMULAS = (("source", "S", False), ("target", "T", False), ("target_without_information", "T", True))
+"""The key of each formula, its task, and whether it was inferred without the information gain."""
+
+LEVELS = ("80", "90", "95")
+
+_TITLES = {
+    "source": "Source task",
+    "target": "Target task",
+    "target_without_information": "Target task without the information gain (λ = 0)",
+}
+_METHODS = {
+    "I": "Q-learning on τ-states",
+    "II": "extended states of φ′ᵀ (λ = 0)",
+    "III": "extended states of φᵀ",
+    "IV": "extended states of φᵀ, starting with the transferred Q̄",
+}
+
+
+def render_report(results: Mapping[str, Any], spec: StudySpec, figures: Mapping[str, str]) -> str:
+    """The report as HTML with everything in it: styles and figures inline, no scripts, nothing from a network.
+
+    Args:
+        results: The results of the study.
+        spec: The study.
+        figures: The SVG text of each figure by name; one that is missing is said to be missing.
+
+    Returns:
+        The page. All text from data is escaped; the same input gives the same page.
+    """
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters["count"] = count
+    template = files("tickwise.experiments").joinpath("report.html.j2").read_text(encoding="utf-8")
+    summary = results["summary"]
+    page = environment.from_string(template).render(
+        spec=spec,
+        summary=summary,
+        verdict=verdict(summary, spec),
+        formulas=[_formula_pair(results, spec, *entry) for entry in FORMULAS],
+        convergence=[_method_row(name, summary, spec, "reached") for name in _METHODS],
+        staying=[_method_row(name, summary, spec, "stays") for name in _METHODS],
+        ratios=_ratio_rows(summary, spec),
+        first_block=first_block_measure(spec),
+        reason=_sentence(summary["reason"]),
+        fail=signed(summary["fail"]),
+        collections=results["collections"],
+        robustness=[_robust_row(inference, spec) for inference in results["inferences"]],
+        figures=_figures(spec, figures),
+        settings=settings_tree(spec.as_dict()),
+        choices=choices(spec),
+        environment=_environment_rows(results["environment"]),
+        command=summary["command"],
+    )
+    return page.rstrip() + "\n"
+
+
+def inline_svg(name: str, svg: str) -> Markup:
+    """An SVG document as an element of a page.
+
+    Its identifiers get the figure's name in front, since those of several figures would clash; its size is left to
+    the page, and comments are dropped.
+    """
+    body = re.sub(r"<!--.*?-->", "", svg[svg.index("<svg") :], flags=re.DOTALL)
+    body = re.sub(r'\bid="', f'id="{name}-', body)
+    body = re.sub(r'href="#', f'href="#{name}-', body)
+    body = re.sub(r"url\(#", f"url(#{name}-", body)
+    opening, rest = body.split(">", 1)
+    opening = re.sub(r'\s(width|height)="[^"]*"', "", opening) + f' role="img" aria-labelledby="{name}-caption"'
+    return Markup(f"{opening}>{rest.strip()}")
+
+
+def settings_tree(value: Any) -> Any:
+    """Plain data as text, or as pairs of a name and a tree, for a nested table."""
+    if isinstance(value, Mapping):
+        if set(value) == {"bounds"}:  # a region
+            return ranges_text(Box(tuple(Bound(**bound) for bound in value["bounds"])))
+        return [(str(key).replace("_", " "), settings_tree(inner)) for key, inner in value.items()]
+    if isinstance(value, bool) or value is None:
+        return {True: "yes", False: "no", None: "none"}[value]
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        parts = [settings_tree(item) for item in value]
+        if any(isinstance(item, Sequence) and not isinstance(item, str) for item in value):
+            return "; ".join(str(part) for part in parts)
+        return ", ".join(str(part) for part in parts)
+    if isinstance(value, int):
+        return f"{value:,}"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _sentence(reason: str) -> str:
+    """A reason as a sentence of its own, after the answer that it is the reason of."""
+    text = reason.removeprefix("Logical transferability is not identified: ")
+    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+
+
+def _figures(spec: StudySpec, figures: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+    return {
+        name: {
+            "name": name,
+            "title": caption.title,
+            "caption": caption.text,
+            "counterpart": caption.counterpart,
+            "svg": inline_svg(name, figures[name]) if name in figures else None,
+        }
+        for name, caption in captions(spec).items()
+    }
+
+
+def _formula_pair(results: Mapping[str, Any], spec: StudySpec, key: str, task: str, primed: bool) -> dict[str, Any]:
+    """One formula of ours beside the paper's."""
+    environment = spec.source if task == "S" else spec.target
+    ours = read_formula(results["summary"]["formulas"][key], task, environment, primed=primed)
+    published = read_formula(spec.published.formulas.get(key), task, environment, primed=primed)
+    facts = _facts(results["inferences"][0], key) if results["inferences"] else {}
+    return {
+        "title": _TITLES[key],
+        "ours": _formula(ours, environment),
+        "paper": _formula(published, environment),
+        "facts": facts,
+    }
+
+
+def _formula(formula: NamedFormula | None, environment: EnvironmentSpec) -> dict[str, Any] | None:
+    if formula is None:
+        return None
+    names = {box: name.plain for box, name in formula.names.items()}
+    return {
+        "symbol": formula.symbol,
+        "named": formula.plain,
+        "full": to_unicode(formula.sdnf),
+        "english": to_english(formula.sdnf, names),
+        "regions": [_region(box, formula, environment) for box in formula.names],
+    }
+
+
+def _region(box: Box, formula: NamedFormula, environment: EnvironmentSpec) -> dict[str, str]:
+    """A region of a formula beside the true one that it is named after."""
+    name = formula.names[box]
+    shares = [
+        (overlap(box, landmark.box, environment.world.size), landmark.box)
+        for landmark in environment.task.landmarks
+        if landmark.label == name.label
+    ]
+    share, true = max(shares, key=lambda pair: pair[0], default=(0.0, None))
+    if true is None:
+        relation = "no true region overlaps it"
+    elif share == 1:
+        relation = "the true region exactly"
+    else:
+        relation = f"true {ranges_text(true)}, overlap {share:.0%}"
+    return {"name": name.plain, "ranges": ranges_text(box), "relation": relation}
+
+
+def _facts(inference: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """Rate, gain and size of a formula of one inference."""
+    if key != "target":
+        return inference[key] or {}
+    attempts = inference["target"]["attempts"]
+    return attempts[-1] if attempts else {}
+
+
+def _method_row(name: str, summary: Mapping[str, Any], spec: StudySpec, kind: str) -> dict[str, Any]:
+    episodes = spec.published.episodes.get(name)
+    method = summary["methods"].get(name)
+    row: dict[str, Any] = {
+        "name": name,
+        "meaning": _METHODS[name],
+        "paper": count(episodes) if episodes is not None else "not within 2,000,000",
+        "cells": None,
+    }
+    if method is None:
+        return row
+    limit = max(method["episodes"])
+    columns = ["first_block"] if kind == "reached" else []
+    columns += [f"{kind}_{level}" for level in LEVELS]
+    row["cells"] = [_cell(method["statistics"][column], len(method["episodes"]), limit) for column in columns]
+    window = method["statistics"]["window_mean"]
+    row["window"] = {
+        "text": signed(window["iqm"], ".1f"),
+        "note": f"{signed(window['low'], '.1f')} to {signed(window['high'], '.1f')}",
+    }
+    return row
+
+
+def _cell(statistics: Mapping[str, Any], runs: int, limit: int) -> dict[str, str]:
+    """Episodes to convergence over the runs, as text and as a note."""
+    reached = statistics["reached"]
+    there = f"{reached} of {runs} runs"
+    if statistics["mean"] is not None and reached == runs:
+        return {
+            "text": count(statistics["mean"]),
+            "note": f"{count(statistics['low'])} to {count(statistics['high'])}; {there}",
+        }
+    if statistics["median"] is not None:
+        return {"text": f"median {count(statistics['median'])}", "note": f"{there} within {count(limit)}"}
+    return {"text": "–" if reached else "none", "note": f"{there} within {count(limit)}"}
+
+
+def _ratio_rows(summary: Mapping[str, Any], spec: StudySpec) -> list[dict[str, Any]]:
+    """How many times fewer episodes one method needs than another."""
+    measures = ("first_block", *(f"reached_{level}" for level in LEVELS))
+    rows = []
+    for pair, ratios in summary["ratios"].items():
+        slow, fast = (spec.published.episodes.get(name) for name in pair.split("/"))
+        paper = f"{slow / fast:.1f}" if slow and fast else "–"
+        cells = [_ratio(ratios.get(measure)) for measure in measures]
+        rows.append({"pair": pair.replace("/", " / "), "paper": paper, "cells": cells})
+    return rows
+
+
+def _ratio(ratio: Mapping[str, Any] | None) -> str:
+    if ratio is None or ratio["value"] is None:
+        return "–"
+    return f"{'≥ ' if ratio['at_least'] else ''}{ratio['value']:.1f}"
+
+
+def _robust_row(inference: Mapping[str, Any], spec: StudySpec) -> dict[str, Any]:
+    """What one collection gave."""
+    source = read_formula(inference["source"]["formula"], "S", spec.source)
+    target = read_formula(inference["target"]["formula"], "T", spec.target)
+    return {
+        "run": inference["run"] + 1,
+        "source": _formula(source, spec.source),
+        "satisfying": inference["source"]["satisfying"],
+        "target": _formula(target, spec.target),
+        "transferable": inference["target"]["transferable"],
+        "reason": inference["target"]["reason"],
+    }
+
+
+def _environment_rows(environment: Mapping[str, Any]) -> list[tuple[str, str]]:
+    names = {
+        "version": "Tickwise", "python": "Python", "cores": "processor cores", "workers": "worker processes",
+        "seconds": "wall-clock time in seconds", "job_seconds": "time of all jobs together in seconds",
+        "peak_memory_mib": "peak memory in MiB",
+    }  # fmt: skip
+    rows = [(names.get(key, key), value) for key, value in environment.items() if key != "command"]
+    return [(name, f"{value:,}" if isinstance(value, int | float) else str(value)) for name, value in rows]

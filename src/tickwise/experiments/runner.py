@@ -1,0 +1,215 @@
+"""Carries out a study: its jobs phase by phase over the cores, skipping what is finished."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import cache
+from multiprocessing import active_children, get_context
+from pathlib import Path
+from typing import Any
+
+from tickwise.errors import ConfigurationError, TickwiseError
+from tickwise.experiments.case_studies import StudySpec
+from tickwise.experiments.jobs import Job, perform, study_formulas
+from tickwise.experiments.progress import Board, Display, Item, board
+from tickwise.experiments.store import Store
+
+Phase = tuple[str, list[Job]]
+"""A name, and jobs that need artefacts of earlier phases only."""
+
+
+def run_study(spec: StudySpec, folder: Path, workers: int, display: Display) -> Store:
+    """Do all jobs of a study; what an earlier call finished in the same folder is kept.
+
+    The numbers depend on the specification alone, not on the number of workers or on interruptions.
+
+    Args:
+        spec: The study.
+        folder: The run folder.
+        workers: Processes that work at the same time; with 1 the work is done in this process.
+        display: Shows the progress.
+
+    Returns:
+        The folder's artefacts.
+
+    Raises:
+        ConfigurationError: If there is not at least one worker.
+        StoreError: If the folder belongs to another configuration or cannot be written.
+        TickwiseError: If a job cannot be done; finished jobs are kept.
+        KeyboardInterrupt: On Ctrl-C or SIGTERM; finished jobs are kept.
+    """
+    if workers < 1:
+        raise ConfigurationError(f"there are {workers} workers; use 1 or more")
+    store = Store.open(folder, spec.as_dict())
+    with _pool(workers) as pool:
+        for phase in _preparation(spec):
+            _carry_out(phase, spec, store, pool, display)
+        for phase in _learning(spec, available_methods(spec, store)):
+            _carry_out(phase, spec, store, pool, display)
+    return store
+
+
+def default_workers() -> int:
+    """The number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def available_methods(spec: StudySpec, store: Store) -> tuple[str, ...]:
+    """The methods that can run once the formulas are inferred, and that the specification has episodes for.
+
+    Method I needs no formula; II needs φ'^T, III and IV need φ^T, and so logical transferability.
+    """
+    formulas = study_formulas(store)
+    needed = {"II": "target_without_information", "III": "target", "IV": "target"}
+    return tuple(
+        method for method in spec.learning.most_episodes if method not in needed or formulas[needed[method]] is not None
+    )
+
+
+def planned_jobs(spec: StudySpec, store: Store) -> list[Job]:
+    """All jobs of a study whose formulas are inferred, in order."""
+    phases = [*_preparation(spec), *_learning(spec, available_methods(spec, store))]
+    return [job for _, jobs in phases for job in jobs]
+
+
+def unfinished(spec: StudySpec, store: Store) -> Job | None:
+    """The first job of a study that is not done; None if all are."""
+    prepared = [job for _, jobs in _preparation(spec) for job in jobs]
+    for job in prepared:
+        if not store.has(job.name):
+            return job
+    return next((job for job in planned_jobs(spec, store) if not store.has(job.name)), None)
+
+
+def _preparation(spec: StudySpec) -> list[Phase]:
+    return [
+        ("Collect", _jobs(spec, "collect", ("source", "target"))),
+        ("Infer", _jobs(spec, "infer", ("",))),
+    ]
+
+
+def _learning(spec: StudySpec, methods: Sequence[str]) -> list[Phase]:
+    """The phases that learn; the longest jobs come first, so that the cores have work to the end."""
+    transfer = "IV" in methods
+    learners = [method for method in methods if method != "IV"] + ["source"] * transfer
+    learners.sort(key=lambda subject: -_episodes(spec, subject))
+    phases = [("Learn", _jobs(spec, "learn", learners))]
+    return phases + [("Transfer", _jobs(spec, "learn", ("IV",)))] * transfer
+
+
+def _jobs(spec: StudySpec, kind: str, subjects: Sequence[str]) -> list[Job]:
+    return [Job(kind, subject, run) for subject in subjects for run in range(spec.runs)]
+
+
+def _episodes(spec: StudySpec, subject: str) -> int:
+    return spec.learning.source_episodes if subject == "source" else spec.learning.most_episodes[subject]
+
+
+def _carry_out(phase: Phase, spec: StudySpec, store: Store, pool: ProcessPoolExecutor | None, display: Display) -> None:
+    name, jobs = phase
+    left = [job for job in jobs if not store.has(job.name)]
+    if not left:
+        display.skip(name, len(jobs))
+        return
+    weights = [_episodes(spec, job.subject) if job.kind == "learn" else 1 for job in left]
+    items = [Item(job.title, job.unit, weight) for job, weight in zip(left, weights, strict=True)]
+    with board(len(left)) as shared, display.phase(name, items, shared, len(jobs) - len(left)) as finish:
+        tasks = [(os.getpid(), index, job, spec, store, shared) for index, job in enumerate(left)]
+        for index in _results(pool, tasks):
+            finish(index)
+
+
+_Task = tuple[int, int, Job, StudySpec, Store, Board]
+
+
+def _results(pool: ProcessPoolExecutor | None, tasks: Sequence[_Task]) -> Iterator[int]:
+    """The index of each task when it is done."""
+    if pool is None:
+        for task in tasks:
+            yield _work(*task)
+        return
+    with _on_signal(
+        signal.SIG_IGN, signal.SIGINT
+    ):  # the workers that start now go on ignoring Ctrl-C, and show no traceback
+        futures: list[Future[int]] = [pool.submit(_work, *task) for task in tasks]
+    try:
+        for future in as_completed(futures):
+            yield future.result()
+    except BrokenProcessPool as error:
+        raise TickwiseError(
+            "a worker process was killed, perhaps for want of memory; run the same command again with fewer "
+            "--workers: what is finished is kept"
+        ) from error
+
+
+@contextmanager
+def _pool(workers: int) -> Iterator[ProcessPoolExecutor | None]:
+    """Worker processes, started as they are needed; None if this process does the work itself.
+
+    An error or Ctrl-C ends them at once: artefacts are written atomically, so that nothing is lost but the work at
+    hand. Only the first Ctrl-C counts, so that no other one disturbs this; being told to end (SIGTERM) is the same.
+    """
+    others = set(active_children())
+    with _on_signal(_interrupt_once, signal.SIGINT, signal.SIGTERM):
+        if workers == 1:
+            yield None
+            return
+        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+        try:
+            yield pool
+        except BaseException:
+            for child in set(active_children()) - others:
+                child.kill()
+            raise
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _interrupt_once(number: int, frame: object) -> None:
+    del frame
+    signal.signal(number, signal.SIG_IGN)
+    raise KeyboardInterrupt
+
+
+@contextmanager
+def _on_signal(action: Callable[[int, Any], None] | signal.Handlers, *numbers: int) -> Iterator[None]:
+    """Let signals do something else for a while; one that is ignored stays so."""
+    main = threading.current_thread() is threading.main_thread()  # no other thread has a say in signals
+    before = {number: signal.getsignal(number) for number in numbers if main}
+    changed = {number: handler for number, handler in before.items() if handler not in (None, signal.SIG_IGN)}
+    for number in changed:
+        signal.signal(number, action)
+    try:
+        yield
+    finally:
+        for number, handler in changed.items():
+            signal.signal(number, handler)
+
+
+def _work(parent: int, index: int, job: Job, spec: StudySpec, store: Store, shared: Board) -> int:
+    """Do a job; its index comes back."""
+    if os.getpid() != parent:
+        _end_with(parent)
+    perform(job, spec, store, shared.reporter(index))
+    return index
+
+
+@cache
+def _end_with(parent: int) -> None:
+    """Let this worker end soon after the process that started it, even if that was killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

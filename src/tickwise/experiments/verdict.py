@@ -1,0 +1,77 @@
+"""What a study found, in a few plain sentences with the key numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from tickwise.experiments.case_studies import StudySpec
+
+
+def count(value: float | None) -> str:
+    """A number of episodes, for instance ``2,000,000``; a dash for None."""
+    return "–" if value is None else f"{value:,.0f}"
+
+
+def verdict(summary: Mapping[str, Any], spec: StudySpec) -> list[str]:
+    """The sentences of a report's first paragraph.
+
+    Args:
+        summary: The summary of the study.
+        spec: The study.
+
+    Returns:
+        Sentences, each with a full stop.
+    """
+    sentences = [_transferability(summary)]
+    for name, subject in (
+        ("III", "With the inferred formula's clocks and locations in the state (Method III)"),
+        ("IV", "With the source's Q-function transferred as well (Method IV)"),
+        ("I", "Without a formula (Method I)"),
+    ):
+        if name in summary["methods"]:
+            sentences.append(_method(summary, spec, name, subject))
+    if summary["quick"]:
+        sentences.append("This was a short run to look at: fewer runs and episodes than the study proper.")
+    return sentences
+
+
+def _transferability(summary: Mapping[str, Any]) -> str:
+    structures = summary["structures"]
+    share = f"{structures['transferable']} of {structures['of']} collections"
+    if summary["transferable"]:
+        return f"The target task is logically transferable from the source task; this was identified from {share}."
+    return (
+        "Logical transferability was not identified from the first collection, so that nothing was transferred and "
+        f"Methods III and IV were not carried out (it was identified from {share})."
+    )
+
+
+def _method(summary: Mapping[str, Any], spec: StudySpec, name: str, subject: str) -> str:
+    """How fast a method was by the first block at the optimum, beside the paper's number."""
+    method = summary["methods"][name]
+    found, runs = method["statistics"]["first_block"], len(method["episodes"])
+    block = f"block of {spec.learning.block} episodes at the optimum"
+    if found["reached"] == runs and found["mean"] is not None:
+        text = f"{subject}, the first {block} came after {count(found['mean'])} episodes on average over {runs} runs"
+    else:
+        limit = count(max(method["episodes"]))
+        text = f"{subject}, {found['reached']} of {runs} runs had a {block} within {limit} episodes"
+    return text + _ratio(summary, name) + f" (paper: {_published(spec, name)})."
+
+
+def _ratio(summary: Mapping[str, Any], name: str) -> str:
+    """How the method compares with the next better or worse one, as the end of a sentence."""
+    pair = {"IV": "III/IV", "I": "I/III"}.get(name, "")
+    ratio = summary["ratios"].get(pair, {}).get("first_block")
+    if ratio is None or ratio["value"] is None:
+        return ""
+    least = "at least " if ratio["at_least"] else ""
+    if name == "IV":
+        return f", {least}{ratio['value']:.1f} times fewer than without the transfer"
+    return f", {least}{ratio['value']:.1f} times as many as Method III"
+
+
+def _published(spec: StudySpec, name: str) -> str:
+    episodes = spec.published.episodes.get(name)
+    return "not within 2,000,000" if episodes is None else count(episodes)

@@ -1,0 +1,38 @@
+"""What all tests share: Hypothesis' profile, and one finished run of a tiny study."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+# the first call of a compiled kernel takes seconds; on a server the same cases are tried each time
+settings.register_profile("tickwise", deadline=None, derandomize="CI" in os.environ)
+settings.load_profile("tickwise")
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run folder of the tiny study with all artefacts and its report; not to be changed."""
+    from rich.console import Console
+
+    from tests.experiments.tiny import TINY
+    from tickwise.experiments.progress import Display
+    from tickwise.experiments.publish import publish
+    from tickwise.experiments.runner import run_study
+
+    folder = tmp_path_factory.mktemp("finished") / "tiny"
+    publish(TINY, run_study(TINY, folder, 1, Display(Console(quiet=True))), 1, 1.5)
+    return folder
+
+
+@pytest.fixture
+def studies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The tiny studies on the command line."""
+    from tests.experiments import tiny
+    from tickwise.experiments import case_studies
+
+    for name, study in tiny.STUDIES.items():
+        monkeypatch.setitem(case_studies.STUDIES, name, study)
