@@ -1,0 +1,66 @@
+# Everything happens in $(VENV); nothing is installed elsewhere.
+VENV ?= .venv
+PYTHON ?= python3
+WORKERS ?= 2
+
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-slow lint types bench lock clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' $(MAKEFILE_LIST) | expand -t 14
+
+demo: $(VENV)/.runtime ## reproduce Case Study 1 with few runs, and write its report
+	$(BIN)/tickwise reproduce case1 --quick --out runs/case1-quick
+
+test: $(VENV)/.development ## run the tests
+	$(BIN)/python -m pytest -n $(WORKERS) tests
+
+test-slow: $(VENV)/.development ## run the longer studies too
+	$(BIN)/python -m pytest -n $(WORKERS) -m "slow or not slow" tests
+
+lint: $(VENV)/.development ## check style and layout
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(VENV)/.development ## check the types
+	$(BIN)/mypy
+
+bench: $(VENV)/.runtime ## compare the learning loop with C
+	$(BIN)/python benchmarks/learning.py
+
+# The stamps say that an environment holds what a lock file names.
+$(VENV)/.created:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	  { echo "tickwise needs Python 3.11 or later, but $(PYTHON) is $$($(PYTHON) --version 2>&1); say which: make PYTHON=python3.12" >&2; exit 1; }
+	$(PYTHON) -m venv $(VENV)
+	@touch $@
+
+$(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
+	$(PIP) install --requirement requirements.lock
+	$(PIP) install --no-deps --editable .
+	@touch $@
+
+$(VENV)/.development: $(VENV)/.runtime requirements-dev.lock
+	$(PIP) install --requirement requirements-dev.lock
+	@touch $@
+
+# rtamt has no release for Python 3.13: run this with 3.11 or 3.12
+FREEZE := build/lock/bin/python -m pip freeze --exclude tickwise
+PINS := sed -E 's/^(rtamt|antlr4-python3-runtime)==.*/&; python_version < "3.13"/'
+
+lock: ## resolve the lock files anew
+	rm -rf build/lock
+	$(PYTHON) -m venv build/lock
+	build/lock/bin/python -m pip install --quiet .
+	{ head -n 1 requirements.lock; $(FREEZE); } > build/runtime.lock
+	build/lock/bin/python -m pip install --quiet '.[dev]'
+	{ head -n 1 requirements-dev.lock; $(FREEZE) | $(PINS); } > build/development.lock
+	mv build/runtime.lock requirements.lock
+	mv build/development.lock requirements-dev.lock
+
+clean: ## remove the environment and what can be made again; runs/ stays
+	rm -rf $(VENV) build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache
+	find src tests benchmarks -name __pycache__ -prune -exec rm -rf {} +
