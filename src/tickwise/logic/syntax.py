@@ -209,39 +209,28 @@ class Not(Formula):
         return (self.operand,)
 
 
-def _check_operands(operands: tuple[Formula, ...]) -> None:
-    if len(operands) < 2:
-        raise FormulaError("a conjunction or disjunction needs at least two operands")
+@dataclass(frozen=True, slots=True)
+class _Connective(Formula):
+    operands: tuple[Formula, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.operands) < 2:
+            raise FormulaError("a conjunction or disjunction needs at least two operands")
+
+    @property
+    def children(self) -> tuple[Formula, ...]:
+        """The direct subformulas, in order."""
+        return self.operands
 
 
 @dataclass(frozen=True, slots=True)
-class And(Formula):
+class And(_Connective):
     """Conjunction of two or more formulas."""
 
-    operands: tuple[Formula, ...]
-
-    def __post_init__(self) -> None:
-        _check_operands(self.operands)
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """The direct subformulas, in order."""
-        return self.operands
-
 
 @dataclass(frozen=True, slots=True)
-class Or(Formula):
+class Or(_Connective):
     """Disjunction of two or more formulas."""
-
-    operands: tuple[Formula, ...]
-
-    def __post_init__(self) -> None:
-        _check_operands(self.operands)
-
-    @property
-    def children(self) -> tuple[Formula, ...]:
-        """The direct subformulas, in order."""
-        return self.operands
 
 
 @dataclass(frozen=True, slots=True)

@@ -124,8 +124,8 @@ def _inferred_regions(axes: Axes, formula: NamedFormula, environment: Environmen
         text = f"${'¬' if box in outside else ''}{name.math}$"
         style: dict[str, Any] = {"va": "center", "fontsize": 12.5, "path_effects": _HALO, "zorder": 6}
         middle = (bottom + top) / 2
-        if right - left > _NARROW:
-            axes.text((left + right) / 2, middle, text, ha="center", **style)
+        if right - left > _NARROW:  # in a corner: the true region's name is at the middle of an edge
+            axes.text(left + 0.15, bottom + 0.15, text, ha="left", **{**style, "va": "bottom"})
         elif right + 1.2 <= size:
             axes.text(right + 0.15, middle, text, ha="left", **style)
         else:
