@@ -70,8 +70,10 @@ def tickwise(capsys: pytest.CaptureFixture[str]) -> Tickwise:
 
 def process(*arguments: object, module: str = "tickwise", **options: Any) -> subprocess.Popen[str]:
     """The command line, or that of the tiny studies, in a process group of its own."""
+    # what starts the tests in the background has them ignore Ctrl-C, and their children inherit it
+    listening = ["env", "--default-signal=INT"] if sys.platform.startswith("linux") else []
     return subprocess.Popen(
-        [sys.executable, "-m", module, *map(str, arguments)],
+        [*listening, sys.executable, "-m", module, *map(str, arguments)],
         cwd=ROOT, text=True, encoding="utf-8", start_new_session=True,
         **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": {**os.environ, **PLAIN}, **options},
     )  # fmt: skip
@@ -623,6 +625,8 @@ def test_ctrl_c_ends_a_study_at_once(tmp_path: Path, again: bool):
     assert lines_without_progress(err) == [
         f"interrupted; what is finished is kept in {folder}: run the same command again to go on"
     ]
+    while members(running.pid) and time.monotonic() < began + 10:  # Python's resource tracker ends after its parent
+        time.sleep(0.02)
     assert members(running.pid) == []
     assert wanted.exists()
     assert not list(folder.rglob("*.tmp"))

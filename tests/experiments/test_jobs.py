@@ -233,5 +233,5 @@ def test_a_study_that_fails_says_why(tmp_path: Path):
     found = store.load("infer-0")
     assert not found["source"]["satisfying"]
     assert found["target"]["formula"] is None
-    assert "does not satisfy the constraints of Problem 1" in found["target"]["reason"]
+    assert "violates a constraint of Problem 1" in found["target"]["reason"]
     assert found["target_without_information"] is None

@@ -84,8 +84,8 @@ def test_nothing_transferable_is_a_result_too(tmp_path: Path):
     assert summary["ratios"] == {}
     assert summary["formulas"]["source"] is not None
     assert summary["formulas"]["target"] is None
-    assert "constraints of Problem 1" in summary["reason"]
-    assert "constraints of Problem 1" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "violates a constraint of Problem 1" in summary["reason"]
+    assert "violates a constraint of Problem 1" in (folder / "report.html").read_text(encoding="utf-8")
     assert republish(folder) == summary
 
 

@@ -137,11 +137,10 @@ def _results(pool: ProcessPoolExecutor | None, tasks: Sequence[_Task]) -> Iterat
         for task in tasks:
             yield _work(*task)
         return
-    with _on_signal(
-        signal.SIG_IGN, signal.SIGINT
-    ):  # the workers that start now go on ignoring Ctrl-C, and show no traceback
-        futures: list[Future[int]] = [pool.submit(_work, *task) for task in tasks]
     try:
+        # the workers that start now go on ignoring Ctrl-C, and show no traceback
+        with _on_signal(signal.SIG_IGN, signal.SIGINT):
+            futures: list[Future[int]] = [pool.submit(_work, *task) for task in tasks]
         for future in as_completed(futures):
             yield future.result()
     except BrokenProcessPool as error:
