@@ -240,3 +240,12 @@ def test_a_folder_that_may_not_be_written_is_named(tmp_path: Path):
     tmp_path.chmod(0o500)
     with pytest.raises(StoreError, match="Permission denied"):
         Store.open(tmp_path, {})
+
+
+def test_sweeping_removes_what_killed_writers_left_and_nothing_else(store: Store):
+    store.save("one", {"run": 0}, {"x": np.arange(3)})
+    before = files(store.folder)
+    (store.folder / "artefacts" / ".two.npz.123.tmp").write_bytes(b"half")
+    store.sweep()
+    assert files(store.folder) == before
+    assert store.load("one")["x"].tolist() == [0, 1, 2]

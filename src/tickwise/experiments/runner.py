@@ -48,11 +48,15 @@ def run_study(spec: StudySpec, folder: Path, workers: int, display: Display) -> 
     if workers < 1:
         raise ConfigurationError(f"there are {workers} workers; use 1 or more")
     store = Store.open(folder, spec.as_dict())
-    with _pool(workers) as pool:
-        for phase in _preparation(spec):
-            _carry_out(phase, spec, store, pool, display)
-        for phase in _learning(spec, available_methods(spec, store)):
-            _carry_out(phase, spec, store, pool, display)
+    try:
+        with _pool(workers) as pool:
+            for phase in _preparation(spec):
+                _carry_out(phase, spec, store, pool, display)
+            for phase in _learning(spec, available_methods(spec, store)):
+                _carry_out(phase, spec, store, pool, display)
+    except BaseException:
+        store.sweep()
+        raise
     return store
 
 

@@ -97,6 +97,11 @@ class Store:
         arrays = _load_npz(self._arrays(name), named) if named else {}
         return {key: value for key, value in manifest.items() if key != "arrays"} | arrays
 
+    def sweep(self) -> None:
+        """Remove what writers left that were killed half-way; call it when nothing is writing any more."""
+        for left in (self.folder / "artefacts").glob(f".*{_TEMPORARY}"):
+            left.unlink(missing_ok=True)
+
     def _manifest(self, name: str) -> Path:
         return self.folder / "artefacts" / f"{name}.json"
 
