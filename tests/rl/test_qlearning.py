@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from tests.rl.twins import random_problem
 from tickwise.automata.build import timed_automata
 from tickwise.envs.gridworld import GridWorld
+from tickwise.envs.planning import optimal_value
 from tickwise.envs.tasks import ReachStayReach, TaskMonitor
 from tickwise.errors import ConfigurationError
 from tickwise.logic.parse import parse
 from tickwise.logic.syntax import Box
-from tickwise.rl.planning import optimal_value
 from tickwise.rl.qlearning import Problem, QSettings, collect, evaluate, learn
 from tickwise.rl.states import Memory, automaton_memory, tau_memory
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from tickwise.envs.planning import optimal_value, worst_value
 from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.jobs import Job, environment_of, labelled_data, study_formulas
 from tickwise.experiments.measures import (
@@ -19,7 +20,6 @@ from tickwise.experiments.runner import available_methods
 from tickwise.experiments.store import Store
 from tickwise.logic.parse import parse
 from tickwise.logic.structure import structure
-from tickwise.rl.planning import optimal_value, worst_value
 
 PAIRS = (("I", "III"), ("III", "IV"))
 """Methods whose episodes to convergence are compared: the paper's one order of magnitude, and the next."""

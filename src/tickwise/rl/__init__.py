@@ -1,1 +1,1 @@
-"""Learning and planning over tables: Q-learning on τ-states and on extended states, exact optimal values."""
+"""Learning over tables: Q-learning on τ-states and on extended states."""

@@ -2,27 +2,44 @@ from __future__ import annotations
 
 import dataclasses
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rl.twins import history_value, random_problem
+from tests.envs.twins import history_success, history_value, random_mdp, random_task
 from tickwise.envs.catalog import CASE_STUDY_1_SOURCE, CASE_STUDY_1_TARGET, CASE_STUDY_2_SOURCE
 from tickwise.envs.gridworld import GridWorld
-from tickwise.envs.tasks import ReachStayReach, Recurrence
+from tickwise.envs.planning import best_success_probability, optimal_value, success_probability, worst_value
+from tickwise.envs.tabulate import TabularMDP
+from tickwise.envs.tasks import ReachStayReach, Recurrence, TaskTable
 from tickwise.logic.syntax import Box
-from tickwise.rl.planning import optimal_value, worst_value
 
 LEFT, RIGHT = Box.of(x=(0, 1)), Box.of(x=(1, 2))
+
+
+def small(seed: int) -> tuple[TabularMDP, TaskTable]:
+    """A random world of up to three states, and a task of up to four ticks that may end early."""
+    rng = np.random.default_rng(seed)
+    states, actions, outcomes, horizon = (int(rng.integers(1, most + 1)) for most in (3, 2, 2, 4))
+    return random_mdp(rng, states, actions, outcomes), random_task(rng, states, horizon)
 
 
 @settings(max_examples=300, deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_values_equal_brute_force_over_histories(seed: int):
-    problem = random_problem(seed, states=3, actions=2, outcomes=2, horizon=4)
-    mdp, task = problem.mdp, problem.task
+    mdp, task = small(seed)
     assert optimal_value(mdp, task) == pytest.approx(history_value(mdp, task), abs=1e-9)
     assert worst_value(mdp, task) == pytest.approx(history_value(mdp, task, sign=-1.0), abs=1e-9)
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_chances_of_success_equal_brute_force_over_histories(seed: int):
+    mdp, task = small(seed)
+    mean = history_success(mdp, task, lambda chances: sum(chances) / len(chances))
+    assert success_probability(mdp, task) == pytest.approx(mean, abs=1e-9)
+    assert best_success_probability(mdp, task) == pytest.approx(history_success(mdp, task, max), abs=1e-9)
 
 
 def test_one_step_by_hand():
@@ -34,6 +51,8 @@ def test_one_step_by_hand():
     # starts: 2 of 16 are on the left and look east
     assert optimal_value(mdp, table) == pytest.approx((2 * 100 + 14 * -10) / 16)
     assert worst_value(mdp, table) == pytest.approx(-10.0)
+    assert best_success_probability(mdp, table) == pytest.approx(2 / 16)
+    assert success_probability(mdp, table) == pytest.approx(2 / 16 / 3)  # straight is one of three actions
 
 
 def test_one_step_with_slips_by_hand():
@@ -77,3 +96,10 @@ def test_always_failing_is_the_worst_in_case_study_2():
     mdp, task = CASE_STUDY_2_SOURCE.mdp(), CASE_STUDY_2_SOURCE.task_table()
     assert worst_value(mdp, task) == pytest.approx(-800.0, abs=5.0)
     assert optimal_value(mdp, task) > 0
+
+
+def test_the_value_of_a_reward_at_the_deadline_follows_from_the_chance():
+    mdp, task = CASE_STUDY_1_SOURCE.mdp(), CASE_STUDY_1_SOURCE.task_table()
+    best, random = best_success_probability(mdp, task), success_probability(mdp, task)
+    assert optimal_value(mdp, task) == pytest.approx(110 * best - 10)
+    assert 0 < random < best <= 1
