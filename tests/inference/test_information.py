@@ -6,18 +6,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.inference.twins import box_paths, box_prior, chain_priors, enumerated, graph_paths
-from tests.strategies import sdnfs
+from tests.strategies import primitives, sdnfs
 from tickwise.errors import FormulaError, UnknownVariableError
 from tickwise.inference.counting import log_probability as fast_log_probability
 from tickwise.inference.information import information_gain, log_probability, probability
 from tickwise.inference.prior import BoxPrior, PathPrior
 from tickwise.inference.space import to_arrays
 from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.sdnf import SDNF, SequentialConjunction, to_sdnf
 from tickwise.logic.syntax import Constant
 
 TOLERANCE = {"rel": 1e-12, "abs": 1e-12}
-small = sdnfs(most=2, disjuncts=2, longest=3)
+small = sdnfs(most=3, disjuncts=3, longest=3)
 
 
 def fast(formula, prior, variables=("x", "y")):
@@ -27,6 +27,7 @@ def fast(formula, prior, variables=("x", "y")):
 @settings(max_examples=300)
 @given(formula=small, drawn=chain_priors())
 def test_probability_equals_enumeration_of_all_paths(formula, drawn):
+    """Up to three disjuncts, whose windows may reach beyond the horizon: what is undecided there counts."""
     prior, initial, step = drawn
     paths = graph_paths(initial, step, prior.coordinates, prior.horizon)
     expected = pytest.approx(enumerated(formula, paths), **TOLERANCE)
@@ -34,7 +35,7 @@ def test_probability_equals_enumeration_of_all_paths(formula, drawn):
     assert fast(formula, prior) == expected
 
 
-@given(formula=sdnfs(("x",), most=2, disjuncts=2, longest=2), horizon=st.integers(1, 3))
+@given(formula=sdnfs(("x",), most=2, disjuncts=3, longest=2), horizon=st.integers(1, 3))
 def test_probability_of_independent_draws_equals_enumeration_of_all_cells(formula, horizon):
     prior = box_prior(horizon)
     expected = pytest.approx(enumerated(formula, box_paths(formula, 0.0, 4.0, horizon), ("x",)), **TOLERANCE)
@@ -45,6 +46,31 @@ def test_probability_of_independent_draws_equals_enumeration_of_all_cells(formul
 @given(formula=sdnfs(most=3, disjuncts=3, longest=5), drawn=chain_priors(25))
 def test_fast_kernel_equals_the_tick_tables(formula, drawn):
     assert fast(formula, drawn[0]) == pytest.approx(probability(formula, drawn[0]), **TOLERANCE)
+
+
+@settings(max_examples=150)
+@given(formula=sdnfs(most=2, disjuncts=3, longest=4), drawn=chain_priors(8))
+def test_a_disjunction_says_no_more_than_each_of_its_disjuncts(formula, drawn):
+    prior = drawn[0]
+    whole = probability(formula, prior)
+    parts = [probability(SDNF((disjunct,)), prior) for disjunct in formula.disjuncts]
+    assert max(parts) - 1e-12 <= whole <= sum(parts) + 1e-12
+    assert whole == pytest.approx(probability(SDNF(formula.disjuncts[::-1]), prior), **TOLERANCE)
+    expected = 0.0 if whole == 0 else -math.log(whole) / prior.horizon
+    assert information_gain(formula, prior) == pytest.approx(expected, **TOLERANCE)
+
+
+@settings(max_examples=150)
+@given(primitive=primitives(longest=3), drawn=chain_priors(8))
+def test_a_primitive_and_its_negation_share_what_is_undecided_only(primitive, drawn):
+    prior = drawn[0]
+    either = sum(probability(SDNF((SequentialConjunction((one,)),)), prior) for one in (primitive, primitive.negation))
+    if primitive.end <= prior.horizon:
+        assert either == pytest.approx(1)
+    else:
+        assert 1 - 1e-12 <= either <= 2 + 1e-12
+    if primitive.start > prior.horizon:
+        assert either == pytest.approx(2)
 
 
 def test_probabilities_by_hand():

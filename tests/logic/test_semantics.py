@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.logic.twins import State, robustness_twin, verdict_twin
-from tests.strategies import VARIABLES, batches, formulas, predicates, random_trajectories
+from tests.strategies import VARIABLES, batches, formulas, predicates, primitives, random_trajectories, sdnfs
 from tickwise.errors import UnknownVariableError
 from tickwise.logic.parse import parse
+from tickwise.logic.sdnf import Primitive
 from tickwise.logic.semantics import holds, robustness, sliding, verdict
 from tickwise.logic.syntax import Always, And, Bound, Box, Constant, Eventually, Formula, Not, Or, Verdict
 
@@ -67,6 +68,28 @@ def test_single_answers_are_the_batch_s(phi: Formula, batch: Ragged) -> None:
     number = phi.robustness(parts[0], variables=VARIABLES)
     assert isinstance(number, float)
     np.testing.assert_equal(number, phi.robustness(parts, variables=VARIABLES)[0])  # type: ignore[index]
+
+
+@settings(max_examples=100)
+@given(formulas(), batches(), st.sampled_from((1e9, -1e9, math.inf)))
+def test_what_lies_past_the_end_means_nothing(phi: Formula, batch: Ragged, filling: float) -> None:
+    values, lengths = batch
+    filled = np.where(np.isnan(values), filling, values)
+    options = {"variables": VARIABLES, "lengths": lengths}
+    np.testing.assert_array_equal(verdict(phi, filled, **options), verdict(phi, values, **options))
+    np.testing.assert_array_equal(robustness(phi, filled, **options), robustness(phi, values, **options))
+
+
+@settings(max_examples=200)
+@given(primitives(), batches())
+def test_a_negated_primitive_is_the_primitive_of_its_dual(primitive: Primitive, batch: Ragged) -> None:
+    """¬◇ρ, □¬ρ and the primitive that is kept for them have one verdict, on trajectories of any length."""
+    values, lengths = batch
+    options = {"variables": VARIABLES, "lengths": lengths}
+    said = verdict(primitive.formula, values, **options)
+    for negation in (Not(primitive.formula), primitive.negation.formula):
+        np.testing.assert_array_equal(verdict(negation, values, **options), -said)
+    assert primitive.negation.negation == primitive
 
 
 @given(formulas(constants=False), batches(), st.integers(0, 2**32 - 1))
@@ -186,11 +209,17 @@ def _rtamt_text(node: Formula, predicates: dict[Box, str]) -> str:
 @pytest.mark.skipif(find_spec("rtamt") is None, reason="rtamt is not installed (it needs Python below 3.13)")
 @pytest.mark.filterwarnings("ignore")
 @settings(max_examples=150, deadline=None)
-@given(formulas(constants=False, longest=3), st.integers(0, 2**32 - 1))
-def test_rtamt_agrees(phi: Formula, seed: int) -> None:
+@given(
+    st.one_of(formulas(constants=False, longest=3), sdnfs(longest=3).map(lambda phi: phi.formula)),
+    st.integers(0, 3),
+    st.integers(0, 2**32 - 1),
+)
+def test_rtamt_agrees_where_the_horizon_fits(phi: Formula, longer: int, seed: int) -> None:
     import rtamt
 
-    trajectory = random_trajectories(seed, 1, phi.end_effect + 2, len(VARIABLES))[0]
+    # rtamt reads no signal of a single tick
+    ticks = max(phi.end_effect + 1 + longer, 2)
+    trajectory = random_trajectories(seed, 1, ticks, len(VARIABLES))[0]
     predicates: dict[Box, str] = {}
     specification = rtamt.StlDiscreteTimeSpecification()
     specification.spec = _rtamt_text(phi, predicates)
