@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.automata.twins import CASE_STUDY, kleene, one, walk, words
-from tests.strategies import VARIABLES, random_trajectories, sdnfs, sequential_conjunctions, trajectories
+from tests.strategies import VARIABLES, batches, primitives, sdnfs, sequential_conjunctions, trajectories
 from tickwise.automata.build import build, timed_automata
 from tickwise.automata.model import ClockConstraint, Edge
 from tickwise.automata.ticks import is_complete
@@ -90,14 +90,29 @@ def test_the_verdict_is_the_semantics_at_every_prefix(conjunction, values):
     np.testing.assert_array_equal(automaton.verdict(batch, variables=VARIABLES, lengths=lengths), expected)
 
 
-@settings(max_examples=150)
-@given(sdnfs(), st.integers(0, 2**32 - 1))
-def test_a_formula_is_the_best_of_its_automata(phi, seed):
-    X = random_trajectories(seed, 20, 40, len(VARIABLES))
+@settings(max_examples=200)
+@given(sdnfs(), batches(most=8, longest=30))
+def test_a_formula_is_the_best_of_its_automata(phi, batch):
+    """Kleene's or of the disjuncts' verdicts, which is their greatest, on trajectories that may end early."""
+    values, lengths = batch
+    ragged = {"variables": VARIABLES, "lengths": lengths}
     automata = timed_automata(phi)
     assert [automaton.conjunction for automaton in automata] == list(phi.disjuncts)
-    best = np.max([automaton.verdict(X, variables=VARIABLES) for automaton in automata], axis=0)
-    np.testing.assert_array_equal(best, semantics.verdict(phi.formula, X, variables=VARIABLES))
+    verdicts = [automaton.verdict(values, **ragged) for automaton in automata]
+    for disjunct, ours in zip(phi.disjuncts, verdicts, strict=True):
+        np.testing.assert_array_equal(ours, semantics.verdict(disjunct.formula, values, **ragged))
+    np.testing.assert_array_equal(np.max(verdicts, axis=0), semantics.verdict(phi.formula, values, **ragged))
+
+
+@settings(max_examples=150)
+@given(primitives(), batches(longest=15))
+def test_the_automaton_of_a_negation_says_the_opposite(primitive, batch):
+    values, lengths = batch
+    ours, negated = (
+        build(SequentialConjunction((one,))).verdict(values, variables=VARIABLES, lengths=lengths)
+        for one in (primitive, primitive.negation)
+    )
+    np.testing.assert_array_equal(negated, -ours)
 
 
 def test_a_formula_that_is_not_in_normal_form_is_brought_there():

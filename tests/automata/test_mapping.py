@@ -7,14 +7,14 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from tests.automata.twins import CASE_STUDY, one
+from tests.automata.twins import CASE_STUDY, one, walk, words
 from tests.strategies import predicates, sequential_conjunctions
 from tickwise.automata.build import build
 from tickwise.automata.mapping import bijections
 from tickwise.automata.model import Edge, TimedAutomaton
 from tickwise.errors import AutomatonError
-from tickwise.logic.sdnf import Primitive, SequentialConjunction
-from tickwise.logic.syntax import Interval
+from tickwise.logic.sdnf import Operator, Primitive, SequentialConjunction
+from tickwise.logic.syntax import Box, Interval, Not
 
 
 def operators(conjunction: SequentialConjunction) -> list[str]:
@@ -69,6 +69,36 @@ def test_the_bijections_preserve_the_structure(data):
     assert [source.stages[q] for q in xi.locations] == list(target.stages)
     every = [np.arange(size) for size in (len(xi.letters), len(xi.locations), len(xi.clocks))]
     assert images(target, xi.letters, xi.locations, xi.clocks) == images(source, *every)
+
+
+@settings(max_examples=100)
+@given(st.data())
+def test_the_image_of_a_run_is_a_run_where_the_numbers_are_the_same(data):
+    """A target whose predicates alone differ, complements included, goes where the source goes under ξ."""
+    conjunction = data.draw(sequential_conjunctions())
+    others = (replace(primitive, predicate=data.draw(predicates())) for primitive in conjunction.primitives)
+    target, source = build(SequentialConjunction(tuple(others))), build(conjunction)
+    xi = bijections(target, source)
+    word = data.draw(words(conjunction))
+    for (q, v), (image, valuation) in zip(walk(target, word), walk(source, xi.letters[word].tolist()), strict=True):
+        assert xi.locations[q] == image
+        assert [v[clock] for clock in np.argsort(xi.clocks)] == list(valuation)
+
+
+@pytest.mark.parametrize("operator", Operator)
+@pytest.mark.parametrize("polarity", [Box.of(x=(0, 1)), Not(Box.of(x=(0, 1)))], ids=["box", "complement"])
+def test_a_negation_maps_to_its_dual_and_to_nothing_else(operator, polarity):
+    """¬◇ρ is transferable from □σ, whichever of the two is a complement (Definition 6 compares operators)."""
+    duration = 2 if operator.nested else 0
+    primitive = Primitive(operator, Interval(1, 3), duration, polarity)
+    negated = build(SequentialConjunction((primitive.negation,)))
+    for other in Operator:
+        source = build(one(other.value, 0, 4, 3 if other.nested else 0))
+        if other is operator.dual:
+            assert bijections(negated, source).locations.tolist() == list(range(len(source.locations)))
+        else:
+            with pytest.raises(AutomatonError, match="not isomorphic"):
+                bijections(negated, source)
 
 
 @settings(max_examples=150)
