@@ -109,7 +109,7 @@ class TaskTable:
         ):
             if array.min() < 0 or array.max() >= count:
                 raise DataError(f"{name} has a number outside 0..{count - 1}")
-        _check_ticks("horizon", self.horizon, least=1)
+        check_ticks("horizon", self.horizon, least=1)
 
     @property
     def n_states(self) -> int:
@@ -145,8 +145,8 @@ class ReachStayReach:
     penalty: float = -10.0
 
     def __post_init__(self) -> None:
-        _check_ticks("stay", self.stay, least=0)
-        _check_ticks("deadline", self.deadline, least=self.stay + 1)
+        check_ticks("stay", self.stay, least=0)
+        check_ticks("deadline", self.deadline, least=self.stay + 1)
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
@@ -216,8 +216,8 @@ class Recurrence:
     def __post_init__(self) -> None:
         if not self.regions:
             raise ConfigurationError("a recurrence task has no region to come back to; give at least one")
-        _check_ticks("period", self.period, least=1)
-        _check_ticks("deadline", self.deadline, least=1)
+        check_ticks("period", self.period, least=1)
+        check_ticks("deadline", self.deadline, least=1)
 
     @property
     def landmarks(self) -> tuple[Landmark, ...]:
@@ -352,6 +352,11 @@ def _letters(boxes: Sequence[Box], mdp: TabularMDP) -> NDArray[np.int32]:
     return letter
 
 
-def _check_ticks(name: str, ticks: int, least: int) -> None:
+def check_ticks(name: str, ticks: int, least: int) -> None:
+    """Make sure that a setting is a whole number of ticks.
+
+    Raises:
+        ConfigurationError: If it is not, or less than `least`.
+    """
     if isinstance(ticks, bool) or not isinstance(ticks, int) or ticks < least:
         raise ConfigurationError(f"{name} is {ticks!r}; use a whole number of ticks, {least} or more")
