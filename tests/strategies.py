@@ -126,6 +126,28 @@ def sdnfs(
 
 
 @st.composite
+def equivalents(
+    draw: st.DrawFn, conjunction: SequentialConjunction, variables: Sequence[str] = VARIABLES, *, longest: int = 4
+) -> SequentialConjunction:
+    """A structurally equivalent conjunction (Definition 6) with other numbers and predicates."""
+    parts: list[Primitive] = []
+    for primitive in conjunction.primitives:
+        start = (parts[-1].end + 1 if parts else 0) + draw(st.integers(0, longest))
+        window = Interval(start, start + draw(st.integers(0, longest)))
+        duration = draw(st.integers(1, longest)) if primitive.operator.nested else 0
+        parts.append(Primitive(primitive.operator, window, duration, draw(predicates(variables))))
+    return SequentialConjunction(tuple(parts))
+
+
+@st.composite
+def transferable_pairs(draw: st.DrawFn, *, disjuncts: int = 2, most: int = 2, longest: int = 3) -> tuple[SDNF, SDNF]:
+    """A formula, and another of one to three times as many disjuncts that is transferable from it (Definition 7)."""
+    source = draw(sdnfs(most=most, disjuncts=disjuncts, longest=longest))
+    copies = source.disjuncts * draw(st.integers(1, 3))
+    return source, SDNF(tuple(draw(equivalents(disjunct, longest=longest)) for disjunct in copies))
+
+
+@st.composite
 def trajectories(
     draw: st.DrawFn, variables: int = len(VARIABLES), *, shortest: int = 1, longest: int = 20
 ) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from tests.automata.twins import CASE_STUDY, one, walk, words
-from tests.strategies import predicates, sequential_conjunctions
+from tests.strategies import equivalents, predicates, sequential_conjunctions
 from tickwise.automata.build import build
 from tickwise.automata.mapping import bijections
 from tickwise.automata.model import Edge, TimedAutomaton
@@ -19,19 +19,6 @@ from tickwise.logic.syntax import Box, Interval, Not
 
 def operators(conjunction: SequentialConjunction) -> list[str]:
     return [primitive.operator.value for primitive in conjunction.primitives]
-
-
-@st.composite
-def equivalents(draw: st.DrawFn, conjunction: SequentialConjunction) -> SequentialConjunction:
-    """A structurally equivalent conjunction (Definition 6) with other numbers and predicates."""
-    parts, earliest = [], 0
-    for primitive in conjunction.primitives:
-        start = earliest + draw(st.integers(0, 4))
-        window = Interval(start, start + draw(st.integers(0, 4)))
-        duration = draw(st.integers(1, 4)) if primitive.operator.nested else 0
-        parts.append(Primitive(primitive.operator, window, duration, draw(predicates())))
-        earliest = parts[-1].end + 1
-    return SequentialConjunction(tuple(parts))
 
 
 def images(automaton: TimedAutomaton, letters, locations, clocks) -> set[tuple[object, ...]]:

@@ -2,7 +2,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from tests.strategies import VARIABLES, random_trajectories, sdnfs
+from tickwise.automata.run import letters_of
 from tickwise.errors import NotTransferableError
 from tickwise.inference.prior import BoxPrior
 from tickwise.inference.space import SearchSpace
@@ -10,7 +14,7 @@ from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.inference.tree import InferenceSettings
 from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.logic.structure import structurally_transferable
 from tickwise.transfer.hypothesis import Task, require_transferable, tick_tables, transfer_structure
 
@@ -80,3 +84,15 @@ def test_tick_tables_are_one_for_each_disjunct_and_may_keep_full_valuations():
     reduced, full = tick_tables(formula, 10), tick_tables(formula, 10, reduce=False)
     assert len(reduced) == len(full) == 2
     assert all(len(few) < len(many) for few, many in zip(reduced, full, strict=True))
+
+
+@settings(max_examples=100)
+@given(sdnfs(most=2), st.integers(1, 9), st.booleans(), st.integers(0, 2**32 - 1))
+def test_tick_tables_say_what_the_semantics_says_also_where_a_formula_looks_beyond_the_episode(
+    formula: SDNF, horizon: int, reduce: bool, seed: int
+):
+    X = random_trajectories(seed, 4, horizon + 1, len(VARIABLES))
+    tables = tick_tables(formula, horizon, reduce=reduce)
+    for table, disjunct in zip(tables, formula.disjuncts, strict=True):
+        expected = disjunct.formula.verdict(X, variables=VARIABLES)
+        np.testing.assert_array_equal(table.verdicts(letters_of(table.automaton, X, variables=VARIABLES)), expected)

@@ -1,17 +1,22 @@
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterator
+from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from tests.strategies import equivalents, sequential_conjunctions, transferable_pairs
+from tickwise.automata.build import build
 from tickwise.automata.mapping import bijections
 from tickwise.automata.ticks import TickTable
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.errors import AutomatonError, DataError
 from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.sdnf import SDNF, Primitive, to_sdnf
 from tickwise.rl.states import Memory, automaton_memory, tau_memory
 from tickwise.transfer.hypothesis import tick_tables
 from tickwise.transfer.qtransfer import similar_states, similar_valuations, transfer_q
@@ -38,62 +43,69 @@ def recognisable(memory: Memory, mdp: TabularMDP) -> np.ndarray:
     return np.arange(np.prod(shape), dtype=np.float32).reshape(shape)
 
 
-def slow_transfer(source: str, target: str, sizes: tuple[int, int], q: np.ndarray) -> dict[tuple, np.ndarray]:
-    """Algorithm 2 written out with loops, for automata whose clocks and locations correspond by position."""
-    source_mdp, target_mdp = (GridWorld(size).mdp() for size in sizes)
-    source_tables, target_tables = tables(source), tables(target)
-    offsets = np.cumsum([0, *map(len, source_tables)])
-    result = {}
-    for i, table in enumerate(target_tables):
-        i_hat = i % len(source_tables)
-        other = source_tables[i_hat]
-        for u, s in itertools.product(range(1, len(table)), range(target_mdp.n_states)):
-            j = table.stage[u]
-            regions = [
-                t.automaton.conjunction.primitives[j].box.centroid(("x", "y"), m.limits)
-                for t, m in ((other, source_mdp), (table, target_mdp))
+def algorithm_2(
+    source_mdp: TabularMDP, source_memory: Memory, q: np.ndarray, target_mdp: TabularMDP, target_memory: Memory
+) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Algorithm 2, line by line: a target memory state, a target state, and the values of all actions there.
+
+    Correspondence is by position, and a world's states are four headings a cell.
+    """
+    for i, target in enumerate(target_memory.tables):  # line 2; i counts from 0, so that i mod m is right
+        i_hat = i % len(source_memory.tables)  # line 4
+        source = source_memory.tables[i_hat]
+
+        @cache
+        def similar_state(j: int, s: int, tables: tuple[TickTable, TickTable] = (source, target)) -> int:  # line 6
+            rho, own = (table.automaton.conjunction.primitives[j] for table in tables)
+            here = target_mdp.coordinates[s]
+            relative = here - own.box.centroid(target_mdp.variables, target_mdp.limits)
+            centroid = rho.box.centroid(source_mdp.variables, source_mdp.limits)
+            ranks = []
+            for cell, there in enumerate(source_mdp.cell_coordinates):
+                distance = round(float(np.sum((there - centroid - relative) ** 2)), 9)
+                disagrees = contains(rho, source_mdp.variables, there) != contains(own, target_mdp.variables, here)
+                ranks.append((distance, disagrees, cell))
+            return min(ranks)[2] * 4 + s % 4
+
+        for u in range(1, len(target)):
+            j = int(target.stage[u])  # line 3, and by position line 5
+            there = [v for v in range(1, len(source)) if source.location[v] == target.location[u]]  # line 7
+            apart = [  # lines 8 to 11
+                (sum((int(a) - int(b)) ** 2 for a, b in zip(source.clocks[v], target.clocks[u], strict=True)), v)
+                for v in there or [0]
             ]
-            inside = [
-                lambda point, rho=t.automaton.conjunction.primitives[j]: (
-                    all(low.lower <= value <= low.upper for low, value in zip(rho.box.bounds, point, strict=True))
-                    != rho.complemented
-                )
-                for t in (other, table)
-            ]
-            best = None
-            for cell in range(source_mdp.n_cells):
-                here, there = source_mdp.cell_coordinates[cell], target_mdp.coordinates[s]
-                distance = round(float(np.sum(((here - regions[0]) - (there - regions[1])) ** 2)), 9)
-                rank = (distance, inside[0](here) != inside[1](there), cell)
-                best = rank if best is None else min(best, rank)
-            assert best is not None
-            similar_s = best[2] * 4 + s % 4
-            choices = [
-                (float(np.sum((other.clocks[v].astype(int) - table.clocks[u].astype(int)) ** 2)), v)
-                for v in range(1, len(other))
-                if other.location[v] == table.location[u]
-            ]
-            result[i, u, s] = q[offsets[i_hat] + min(choices)[1], similar_s]
-    return result
+            for s in range(target_mdp.n_states):  # line 12
+                values = q[source_memory.offsets[i_hat] + min(apart)[1], similar_state(j, s)]
+                yield target_memory.offsets[i] + u, s, values
 
 
-@pytest.mark.parametrize(
-    ("source", "target", "sizes"),
-    [
-        (SOURCE, TARGET, (4, 5)),
-        (SOURCE, f"({TARGET}) | ({SOURCE})", (4, 5)),
-        ("G[0,6] F[0,2] (1 <= x <= 2 & 0 <= y <= 1)", "G[0,9] F[0,3] !(0 <= x <= 2 & 0 <= y <= 2)", (3, 5)),
-    ],
-)
-def test_transfer_is_algorithm_2(source: str, target: str, sizes: tuple[int, int]):
-    source_mdp, source_memory, target_mdp, target_memory = memories(source, target, sizes)
+def contains(rho: Primitive, variables: tuple[str, ...], point: np.ndarray) -> bool:
+    """Whether a primitive's predicate holds at a point."""
+    inside = True
+    for bound in rho.box.bounds:
+        value = point[variables.index(bound.variable)]
+        above = value > bound.lower or (value == bound.lower and not bound.lower_strict)
+        inside &= above and (value < bound.upper or (value == bound.upper and not bound.upper_strict))
+    return inside != rho.complemented
+
+
+@settings(max_examples=100)
+@given(transferable_pairs(), st.integers(1, 4), st.integers(1, 4), st.booleans())
+def test_transfer_is_algorithm_2(formulas: tuple[SDNF, SDNF], source_size: int, target_size: int, reduce: bool):
+    """Every operator, complements, disjunctions of one to six, clocks of different range, worlds of any two sizes."""
+    source_mdp, target_mdp = GridWorld(source_size).mdp(), GridWorld(target_size).mdp()
+    source_memory, target_memory = (
+        automaton_memory(mdp, tick_tables(formula, 4, reduce=reduce))
+        for mdp, formula in zip((source_mdp, target_mdp), formulas, strict=True)
+    )
     q = recognisable(source_memory, source_mdp)
     found = transfer_q(source_mdp, source_memory, q, target_mdp, target_memory, initial=-1.0)
+    assert found.shape == (target_memory.n_states, target_mdp.n_states, 3)
     assert found.dtype == np.float32
-    for offset in target_memory.offsets:
-        assert (found[offset] == -1.0).all()
-    for (i, u, s), values in slow_transfer(source, target, sizes, q).items():
-        assert (found[target_memory.offsets[i] + u, s] == values).all()
+    expected = np.full(found.shape, -1.0, dtype=np.float32)
+    for u, s, values in algorithm_2(source_mdp, source_memory, q, target_mdp, target_memory):
+        expected[u, s] = values
+    np.testing.assert_array_equal(found, expected)
 
 
 def test_transfer_to_the_same_task_is_the_identity():
@@ -101,6 +113,27 @@ def test_transfer_to_the_same_task_is_the_identity():
     q = recognisable(memory, mdp)
     found = transfer_q(mdp, memory, q, mdp, memory, initial=0.0)
     assert (found[1:] == q[1:]).all()
+
+
+@settings(max_examples=100)
+@given(st.data(), st.booleans())
+def test_every_clock_gets_its_nearest_value_wherever_these_occur_together(data: st.DataObject, reduce: bool):
+    """Line 10 to the letter; where they never occur together the location is still ξ_Q's."""
+    conjunction = data.draw(sequential_conjunctions(most=2))
+    source, target = (
+        build(one).compile(reduce=reduce) for one in (conjunction, data.draw(equivalents(conjunction, longest=6)))
+    )
+    xi = bijections(target.automaton, source.automaton)
+    similar = similar_valuations(source, target, xi)
+    for u in range(1, len(target)):
+        there = [v for v in range(1, len(source)) if source.location[v] == xi.locations[target.location[u]]]
+        if not there:  # the source leaves its first location with the first letter
+            assert similar[u] == 0
+            continue
+        assert similar[u] in there
+        apart = np.abs(source.clocks[there][:, xi.clocks].astype(int) - target.clocks[u].astype(int))
+        if (apart == apart.min(axis=0)).all(axis=1).any():
+            assert (apart[there.index(similar[u])] == apart.min(axis=0)).all()
 
 
 def test_similar_states_keep_the_heading_and_prefer_a_state_that_agrees_on_the_predicate():
@@ -138,6 +171,26 @@ def test_transfer_needs_structurally_equivalent_conjunctions():
     q = recognisable(source_memory, source_mdp)
     with pytest.raises(AutomatonError, match="isomorphic"):
         transfer_q(source_mdp, source_memory, q, target_mdp, target_memory, initial=0.0)
+
+
+def test_transfer_needs_a_whole_number_of_copies():
+    """Two or three disjuncts of the source's make no target, even where each one has its like in the source."""
+    one, two = "G[0,3] (x >= 1)", "F[0,3] (x >= 1)"
+    for source, target in ((f"{one} | {two}", one), (f"{one} | {two}", f"{one} | {two} | {one}")):
+        source_mdp, source_memory, target_mdp, target_memory = memories(source, target, (2, 3))
+        q = recognisable(source_memory, source_mdp)
+        with pytest.raises(AutomatonError, match="not structurally transferable"):
+            transfer_q(source_mdp, source_memory, q, target_mdp, target_memory, initial=0.0)
+
+
+def test_transfer_needs_worlds_with_as_many_coordinates():
+    mdp, memory, *_ = memories(SOURCE, SOURCE, (4, 4))
+    line = TabularMDP(
+        mdp.successor, mdp.probability, mdp.initial, mdp.cell, mdp.cell_coordinates[:, :1], ("x",), ((0.0, 4.0),)
+    )
+    onto = automaton_memory(line, tables("F[0,5] G[0,2] (x >= 1) & F[9,12] (x <= 2)"))
+    with pytest.raises(DataError, match="2 coordinates and the target's 1"):
+        transfer_q(mdp, memory, recognisable(memory, mdp), line, onto, initial=0.0)
 
 
 def test_transfer_refuses_what_is_no_extended_q_function():

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from tickwise.automata.build import timed_automata
+from tickwise.automata.model import TimedAutomaton
 from tickwise.automata.ticks import TickTable
 from tickwise.errors import NotTransferableError
 from tickwise.inference.prior import Prior
@@ -99,13 +101,22 @@ def tick_tables(formula: SDNF, horizon: int, *, reduce: bool = True) -> tuple[Ti
 
     Args:
         formula: φ in SDNF.
-        horizon: The length L of an episode, in ticks: the greatest clock value of the unreduced valuations.
+        horizon: The length L of an episode, in ticks: the greatest clock value of the unreduced valuations. A
+            formula may look beyond it, and is then undecided at an episode's end (the weak view).
         reduce: Hold clocks that a location does not use at 0; False keeps the paper's full valuations.
 
     Returns:
         One table a disjunct.
     """
-    return tuple(automaton.compile(horizon, reduce=reduce) for automaton in timed_automata(formula))
+    return tuple(
+        automaton.compile(max(horizon, *_constants(automaton)), reduce=reduce) for automaton in timed_automata(formula)
+    )
+
+
+def _constants(automaton: TimedAutomaton) -> Iterator[int]:
+    """What the clocks are compared with, in ticks: the windows' ends and the durations, at least."""
+    for primitive in automaton.conjunction.primitives:
+        yield from (primitive.window.end, primitive.duration)
 
 
 def require_transferable(hypothesis: Hypothesis) -> tuple[SDNF, SDNF]:

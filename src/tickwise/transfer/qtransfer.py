@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tickwise.automata.mapping import Bijections, bijections
 from tickwise.automata.ticks import TickTable
 from tickwise.envs.tabulate import TabularMDP
-from tickwise.errors import DataError
+from tickwise.errors import AutomatonError, DataError
 from tickwise.logic.sdnf import Primitive
 from tickwise.logic.semantics import holds
 from tickwise.rl.states import Memory
@@ -36,7 +36,8 @@ def transfer_q(
         Q̄^T, shape ``(target memory states, target states, actions)``.
 
     Raises:
-        DataError: If the worlds' actions or orientations differ, or a memory is not one of extended states.
+        DataError: If the worlds' actions, coordinates or orientations differ in number, or a memory is not one of
+            extended states.
         AutomatonError: If φ^T is not structurally transferable from φ^S.
     """
     _check(source_mdp, source_memory, source_q, target_mdp, target_memory)
@@ -96,7 +97,8 @@ def similar_valuations(source: TickTable, target: TickTable, xi: Bijections) -> 
     """Lines 7 to 11: for each target table state the source's in location ξ_Q(q) with the nearest clock values.
 
     Every clock's value is brought as near as it can be; where the nearest values of two clocks do not occur
-    together in the location, the valuation with the least sum of squared differences is taken.
+    together in the location, the valuation with the least sum of squared differences is taken. A source that leaves
+    its first location with the first letter, at a window [0,0], has only the start there, where nothing is learned.
 
     Args:
         source: The tick table of φ_î^S.
@@ -107,9 +109,9 @@ def similar_valuations(source: TickTable, target: TickTable, xi: Bijections) -> 
         Source table states, shape ``(target table states,)``; 0 for the start.
     """
     similar = np.zeros(len(target), dtype=np.int64)
-    numbers = np.arange(1, len(source))
     for u in range(1, len(target)):
-        there = numbers[source.location[1:] == xi.locations[target.location[u]]]  # line 7
+        there = np.flatnonzero(source.location == xi.locations[target.location[u]])  # line 7
+        there = there[there > 0] if there[-1] > 0 else there
         values = source.clocks[there][:, xi.clocks].astype(np.int64)  # line 9
         distance = ((values - target.clocks[u].astype(np.int64)) ** 2).sum(axis=1)
         similar[u] = there[distance.argmin()]  # line 10
@@ -125,6 +127,16 @@ def _check(
 ) -> None:
     if not (source_memory.tables and target_memory.tables):
         raise DataError("extended Q-functions need memories made of timed automata; use automaton_memory")
+    if len(target_memory.tables) % len(source_memory.tables):
+        raise AutomatonError(
+            f"the target's formula has {len(target_memory.tables)} disjuncts and the source's "
+            f"{len(source_memory.tables)}, so it is not structurally transferable (Definition 7); use a multiple"
+        )
+    if len(source_mdp.variables) != len(target_mdp.variables):
+        raise DataError(
+            f"the source's world has {len(source_mdp.variables)} coordinates and the target's "
+            f"{len(target_mdp.variables)}; transfer compares positions, so use as many in both"
+        )
     if source_mdp.n_actions != target_mdp.n_actions:
         raise DataError(
             f"the source has {source_mdp.n_actions} actions and the target {target_mdp.n_actions}; "
