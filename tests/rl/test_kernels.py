@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rl.twins import random_problem, slow_greedy_returns, slow_q_learning
+from tests.rl.twins import problems, random_problem, slow_greedy_returns, slow_q_learning
 from tickwise.envs.tabulate import TabularMDP, cumulative, draw
 from tickwise.envs.tasks import TaskTable
 from tickwise.rl.kernels import draw_state, greedy_returns
@@ -27,9 +27,8 @@ q_settings = st.builds(
 
 
 @settings(max_examples=300, deadline=None)
-@given(seeds, seeds, q_settings)
-def test_learning_equals_its_twin_step_for_step(problem_seed: int, seed: int, chosen: QSettings):
-    problem = random_problem(problem_seed)
+@given(problems(), seeds, q_settings)
+def test_learning_equals_its_twin_step_for_step(problem: Problem, seed: int, chosen: QSettings):
     fast, slow = problem.initial_q(chosen), problem.initial_q(chosen)
     fast_rng, slow_rng = np.random.default_rng(seed), np.random.default_rng(seed)
     returns, paths = collect(problem, fast, chosen, fast_rng, EPISODES)
@@ -41,9 +40,8 @@ def test_learning_equals_its_twin_step_for_step(problem_seed: int, seed: int, ch
 
 
 @settings(max_examples=200, deadline=None)
-@given(seeds, seeds, st.booleans())
-def test_greedy_play_equals_its_twin(problem_seed: int, seed: int, ties: bool):
-    problem = random_problem(problem_seed)
+@given(problems(), seeds, st.booleans())
+def test_greedy_play_equals_its_twin(problem: Problem, seed: int, ties: bool):
     rng = np.random.default_rng(seed)
     shape = problem.initial_q(QSettings()).shape
     values = rng.integers(0, 2, size=shape) if ties else rng.normal(size=shape)

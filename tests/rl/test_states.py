@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.rl.twins import random_mdp
+from tests.envs.twins import random_mdp
+from tests.rl.twins import extended_problems, nearest_disjunct
 from tickwise.automata.build import timed_automata
-from tickwise.automata.run import EdgeStep, run
+from tickwise.automata.run import EdgeStep, letters_of, run
 from tickwise.automata.ticks import TickTable
 from tickwise.envs.catalog import (
     CASE_STUDY_1_SOURCE,
@@ -20,6 +21,7 @@ from tickwise.envs.tabulate import TabularMDP, cumulative, draw
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.logic.parse import parse
 from tickwise.logic.semantics import verdict
+from tickwise.rl.qlearning import Problem, QSettings, collect
 from tickwise.rl.states import Memory, automaton_memory, nearest_centroid, state_letters, tau_memory
 
 SOURCE_1 = "F[1,15] G[0,4] (3 <= x <= 4 & 3 <= y <= 5) & F[21,39] (7 <= x <= 8 & 5 <= y <= 8)"
@@ -130,6 +132,30 @@ def test_extended_states_are_the_run_of_the_automaton(spec: EnvironmentSpec, tex
             seen.add(int(table.verdict[local]))
             assert table.verdict[local] == verdict(formula, X[: t + 1], variables=("x", "y"))
     assert len(seen) > 1, "the walks never come to a verdict"
+
+
+@settings(max_examples=150, deadline=None)
+@given(extended_problems(), st.integers(0, 2**32 - 1), st.sampled_from([0.0, 0.5]))
+def test_learning_takes_place_where_the_chosen_automaton_runs(problem: Problem, seed: int, epsilon: float):
+    """In every episode, also one that ends early, the entries that change are those of the run at every step.
+
+    With α = 1 and γ = 0 an entry becomes the reward, which is never the initial value.
+    """
+    chosen = QSettings(alpha=1.0, gamma=0.0, epsilon=epsilon, initial=1e6)
+    rng, memory = np.random.default_rng(seed), problem.memory
+    for _ in range(5):
+        q = problem.initial_q(chosen)
+        _, paths = collect(problem, q, chosen, rng, 1)
+        path = paths[0, : np.count_nonzero(paths[0] >= 0)]
+        assert (paths[0, len(path) :] == -1).all()
+        i = nearest_disjunct(problem, path[0])
+        table = memory.tables[i]
+        X = problem.mdp.coordinates[path]
+        states = table.run(letters_of(table.automaton, X, variables=problem.mdp.variables))
+        assert table.verdict[states[-1]] == verdict(table.automaton.conjunction.formula, X, variables=("x", "y"))
+        changed = {(int(u), int(s)) for u, s, _ in np.argwhere(q != 1e6)}
+        # nothing is learned in the state that an episode ends in
+        assert changed == set(zip((memory.offsets[i] + states[:-1]).tolist(), path[:-1].tolist(), strict=True))
 
 
 def test_many_visits_reach_both_verdicts():

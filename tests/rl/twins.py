@@ -7,13 +7,17 @@ one step for the next.
 from __future__ import annotations
 
 import numpy as np
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.envs.twins import random_mdp, random_task
+from tests.strategies import sdnfs
+from tickwise.automata.build import timed_automata
 from tickwise.envs.tabulate import cumulative, draw
 from tickwise.envs.tasks import TaskMonitor
+from tickwise.logic.sdnf import SDNF
 from tickwise.rl.qlearning import Problem, QSettings
-from tickwise.rl.states import Memory
+from tickwise.rl.states import Memory, automaton_memory
 
 
 def choose(row: NDArray[np.float32], epsilon: float, uniform: float) -> int:
@@ -77,8 +81,10 @@ def slow_greedy_returns(
     return returns
 
 
-def random_problem(seed: int, *, states: int = 4, actions: int = 3, outcomes: int = 3, horizon: int = 6) -> Problem:
-    """A random world, task and memory; the sizes are at most those given."""
+def random_problem(
+    seed: int, *, states: int = 4, actions: int = 3, outcomes: int = 3, horizon: int = 6, formula: SDNF | None = None
+) -> Problem:
+    """A random world, task and memory, or the memory of a formula's extended states; sizes are at most those given."""
     rng = np.random.default_rng(seed)
     states, actions, outcomes, horizon = (
         int(rng.integers(1, most + 1)) for most in (states, actions, outcomes, horizon)
@@ -90,4 +96,26 @@ def random_problem(seed: int, *, states: int = 4, actions: int = 3, outcomes: in
         delta=rng.integers(memory_states, size=(memory_states, letters)),
         letter=rng.integers(letters, size=mdp.successor.shape),
     )
+    if formula is not None:
+        memory = automaton_memory(mdp, tuple(automaton.compile() for automaton in timed_automata(formula)))
     return Problem(mdp, random_task(rng, states, horizon), memory)
+
+
+def problems() -> st.SearchStrategy[Problem]:
+    """Random problems, half of them with the extended states of a formula of one to three disjuncts."""
+    seeds = st.integers(0, 2**32 - 1)
+    return st.one_of(st.builds(random_problem, seeds), extended_problems())
+
+
+def extended_problems() -> st.SearchStrategy[Problem]:
+    """Random problems with the extended states of a formula; the task knows nothing of it and may end early."""
+    return st.builds(random_problem, st.integers(0, 2**32 - 1), horizon=st.just(12), formula=sdnfs(longest=3))
+
+
+def nearest_disjunct(problem: Problem, s: int) -> int:
+    """The disjunct whose first region's centroid is nearest to a state, ties to the lower."""
+    mdp, distances = problem.mdp, []
+    for i, table in enumerate(problem.memory.tables):
+        centroid = table.automaton.conjunction.primitives[0].box.centroid(mdp.variables, mdp.limits)
+        distances.append((sum((a - b) ** 2 for a, b in zip(mdp.coordinates[s], centroid, strict=True)), i))
+    return min(distances)[1]
