@@ -172,10 +172,11 @@ def _show_summary(summary: Mapping[str, Any], folder: Path) -> None:
     output.print(f"reason: {summary['reason']}")
     runs = summary["runs"]
     table = Table(
-        title=f"Episodes to converge, mean of {runs} run{'' if runs == 1 else 's'} (V* = {summary['v_star']:.2f})",
+        title=f"Episodes to converge, mean of {runs} run{'' if runs == 1 else 's'} (V* = {summary['v_star']:.2f})\n"
+        f"goal: {summary['goal']}",
         title_justify="left",
     )
-    columns = {"first_block": "first block", "reached_80": "80 %", "reached_90": "90 %", "reached_95": "95 %"}
+    columns = {"goal": "goal", "reached_80": "80 %", "reached_90": "90 %", "reached_95": "95 %", "settled": "settled"}
     table.add_column("method")
     for heading in (*columns.values(), "mean return"):
         table.add_column(heading, justify="right")
@@ -185,10 +186,10 @@ def _show_summary(summary: Mapping[str, Any], folder: Path) -> None:
         table.add_row(name, *cells, f"{statistics['window_mean']['iqm']:.1f}")
     output.print(table)
     for pair, measures in summary["ratios"].items():
-        found = measures["first_block"]
+        found = measures["goal"]
         if found["value"] is not None:
             least = "at least " if found["at_least"] else ""
-            output.print(f"{pair} by the first optimal block: {least}{found['value']:.1f} times fewer episodes")
+            output.print(f"{pair} by the goal: {least}{found['value']:.1f} times fewer episodes")
     output.print(f"report: {folder / 'report.html'}")
 
 

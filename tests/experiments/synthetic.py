@@ -9,7 +9,8 @@ import numpy as np
 
 from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.envs.tasks import ReachStayReach
-from tickwise.experiments.case_studies import CASE_STUDY_1, StudySpec
+from tickwise.experiments.case_studies import CASE_STUDY_1
+from tickwise.experiments.study import StudySpec
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.syntax import Box
 
@@ -69,7 +70,11 @@ def results(
             "command": command,
             "formulas": {"source": source, "target": target, "target_without_information": plain},
             "transferable": target is not None, "reason": reason,
-            "structures": {"found": spec.runs, "of": spec.runs, "transferable": spec.runs if target else 0},
+            "structures": {
+                "found": spec.runs, "of": spec.runs, "transferable": spec.runs if target else 0,
+                "exact": {"source": 1, "target": 2},
+            },
+            "goal": spec.learning.goal.text,
             "v_star": V_STAR, "fail": -10.0, "source_v_star": 97.1,
             "methods": {method: _summary(runs) for method, runs in learned.items()},
             "ratios": _ratios(learned), "collections": collections, "seconds": 1234.5,
@@ -122,13 +127,15 @@ def _run(spec: StudySpec, method: str, run: int, rng: np.random.Generator) -> di
     return {
         "run": run,
         "episodes": episodes,
-        "first_block": int(there[0] + 1) * block if len(there) else None,
+        "goal": int(there[0] + 1) * block if len(there) else None,
+        "settled": int(middle) // block * block,
         "reached": {level: int(grid[found[0]]) if len(found) else None for level, found in firsts.items()},
         "stays": {
             level: int(grid[found[-1] + 1]) if len(found) and found[-1] + 1 < len(grid) else None
             for level, found in lasts.items()
         },
         "window_mean": float(blocks[: spec.learning.window // block].mean()),
+        "end_mean": float(blocks[-len(blocks) // 5 :].mean()),
         "blocks": blocks,
         "evaluation_episodes": grid,
         "evaluation_returns": evaluation,
@@ -136,21 +143,16 @@ def _run(spec: StudySpec, method: str, run: int, rng: np.random.Generator) -> di
 
 
 def _summary(runs: list[dict[str, Any]]) -> dict[str, Any]:
-    columns: dict[str, Any] = {"first_block": [run["first_block"] for run in runs]}
+    columns: dict[str, Any] = {name: [run[name] for run in runs] for name in ("goal", "settled")}
     for measure in ("reached", "stays"):
         for level in ("80", "90", "95"):
             columns[f"{measure}_{level}"] = [run[measure][level] for run in runs]
     statistics: dict[str, Any] = {name: _statistics(values) for name, values in columns.items()}
-    means = np.array([run["window_mean"] for run in runs])
-    statistics["window_mean"] = {
-        "iqm": float(means.mean()),
-        "low": float(means.min()),
-        "high": float(means.max()),
+    means = {name: [run[name] for run in runs] for name in ("window_mean", "end_mean")}
+    statistics |= {
+        name: {"iqm": float(np.mean(values)), "low": min(values), "high": max(values)} for name, values in means.items()
     }
-    return {
-        **columns, "episodes": [run["episodes"] for run in runs],
-        "window_mean": [run["window_mean"] for run in runs], "statistics": statistics,
-    }  # fmt: skip
+    return {**columns, **means, "episodes": [run["episodes"] for run in runs], "statistics": statistics}
 
 
 def _statistics(values: list[int | None]) -> dict[str, Any]:
@@ -168,15 +170,15 @@ def _ratios(learned: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
     ratios: dict[str, Any] = {}
     for slow, fast in (("I", "III"), ("III", "IV")):
         if slow in learned and fast in learned:
-            values = [run["first_block"] for run in learned[slow]]
-            others = [run["first_block"] for run in learned[fast]]
+            values = [run["goal"] for run in learned[slow]]
+            others = [run["goal"] for run in learned[fast]]
             censored = None in values
             value = None
             if None not in others:
                 limit = learned[slow][0]["episodes"]
                 value = float(np.mean([item or limit for item in values]) / np.mean(others))
             ratios[f"{slow}/{fast}"] = {
-                measure: {"value": value, "at_least": censored} for measure in ("first_block", "reached_90")
+                measure: {"value": value, "at_least": censored} for measure in ("goal", "reached_90")
             }
     return ratios
 

@@ -18,7 +18,6 @@ from tests.experiments import synthetic
 from tickwise.automata.build import timed_automata
 from tickwise.envs.catalog import CASE_STUDY_2_SOURCE, CASE_STUDY_2_TARGET
 from tickwise.errors import AutomatonError
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.figures import (
     FIGURES,
     automata,
@@ -30,6 +29,7 @@ from tickwise.experiments.figures import (
     tree,
     workflow,
 )
+from tickwise.experiments.study import StudySpec
 from tickwise.logic.parse import parse
 from tickwise.logic.render import to_unicode
 
@@ -95,7 +95,7 @@ def test_the_workflow_has_the_studys_numbers(results: dict[str, Any]):
     assert "18,000 episodes" in said
     assert "6 locations, 2 clocks" in said
     assert "60,000 episodes" in said
-    mean = results["summary"]["methods"]["IV"]["statistics"]["first_block"]["mean"]
+    mean = results["summary"]["methods"]["IV"]["statistics"]["goal"]["mean"]
     assert f"with transfer {mean:,.0f}" in said
 
 
@@ -173,7 +173,7 @@ def test_curves_average_blocks_and_evaluations():
         }
         for run in range(2)
     ]
-    episodes, returns = curves.training_curve(runs, 10)
+    episodes, returns = curves.training_curve(runs, 10, 50_000)
     assert episodes[:2].tolist() == [250, 750]
     assert returns[:, 0].tolist() == [24.5, 34.5]  # the mean of blocks 0 to 49
     assert returns.shape == (2, 100)
@@ -184,7 +184,7 @@ def test_curves_average_blocks_and_evaluations():
 
 def test_curves_of_few_episodes():
     runs = [{"blocks": np.array([1.0, 3.0]), "evaluation_episodes": np.array([0]), "evaluation_returns": np.ones(1)}]
-    _, returns = curves.training_curve(runs, 10)
+    _, returns = curves.training_curve(runs, 10, 50_000)
     assert returns.tolist() == [[2.0]]
     episodes, returns = curves.evaluation_curve(runs)
     assert (episodes.shape, returns.shape) == ((0,), (1, 0))
@@ -210,7 +210,7 @@ def test_runs_that_did_not_get_there_are_arrows(results: dict[str, Any]):
     first = figure.axes[0]
     assert "3 runs" in [text.get_text().strip() for text in first.texts]
     low, high = first.get_xlim()
-    shown = [run["first_block"] for runs in results["methods"].values() for run in runs if run["first_block"]]
+    shown = [run["goal"] for runs in results["methods"].values() for run in runs if run["goal"]]
     assert low < min(shown)
     assert high > 2_000_000
     assert figure.axes[1].get_xlim() == (low, high)

@@ -11,7 +11,6 @@ from tests.experiments.tiny import HOPELESS, TINY
 from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError, DataError, MissingFileError, StoreError
 from tickwise.experiments import jobs
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.jobs import (
     Job,
     evaluation_points,
@@ -21,6 +20,7 @@ from tickwise.experiments.jobs import (
     study_formulas,
 )
 from tickwise.experiments.store import Store
+from tickwise.experiments.study import StudySpec
 from tickwise.logic.structure import structurally_transferable
 from tickwise.rl.qlearning import Problem, collect
 from tickwise.rl.states import tau_memory
@@ -207,11 +207,6 @@ def test_blocks_do_not_depend_on_when_it_is_evaluated(finished: Path, tmp_path: 
     np.testing.assert_array_equal(found["blocks"], other["blocks"])
     assert found["evaluation_episodes"].tolist()[:9] == [0, 7, 14, 21, 28, 35, 42, 49, 56]
     assert len(found["evaluation_returns"]) == len(found["evaluation_episodes"])
-
-
-def test_a_part_of_a_block_at_the_end_is_left_out():
-    returns = np.array([0, 1, 2, 10, 11, 12, 99], dtype=np.float32)
-    np.testing.assert_array_equal(jobs._block_means(returns, 3), np.array([1, 11], dtype=np.float32))
 
 
 def test_the_source_keeps_its_values_and_method_iv_begins_with_them(finished: Path):

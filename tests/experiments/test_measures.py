@@ -6,13 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickwise.experiments.measures import (
+    block_means,
     episode_statistics,
-    first_block,
+    final_mean,
+    goal_reached,
     ratio,
     reached,
     return_statistics,
+    settled,
     stays,
 )
+from tickwise.experiments.study import Goal
 
 EPISODES = np.array([0, 100, 200, 300, 400])
 
@@ -24,17 +28,46 @@ def returns(*values: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("blocks", "expected"),
     [
-        ([90, 95, 100, 80], 30),
-        ([100, 0, 0], 10),
-        ([96.4, 0], 10),  # at the optimum counts
+        ([90, 95, 100, 80], 60),
+        ([100, 0, 0], 20),
+        ([96.4, 0], 20),  # at the optimum counts
         ([96.3, 96.39], None),
         ([], None),
     ],
 )
-def test_first_block_counts_to_the_end_of_the_block(blocks: list[float], expected: int | None):
+def test_the_goal_counts_to_the_end_of_the_block(blocks: list[float], expected: int | None):
     # 96.4 has no exact float32; the block of that mean must count all the same
     optimum = float(np.float32(96.4))
-    assert first_block(np.array(blocks, dtype=np.float32), optimum, 10) == expected
+    episodes = np.repeat(np.array(blocks, dtype=np.float32), 20)
+    assert goal_reached(episodes, Goal(block=20), optimum) == expected
+
+
+def test_a_goal_of_one_episode_has_to_be_exceeded():
+    episodes = np.array([-800, 1_000, 900, 1_100, 2_000], dtype=np.float32)
+    assert goal_reached(episodes, Goal(block=1, above=1_000.0), 2_012.0) == 4
+    assert goal_reached(episodes, Goal(block=1, above=2_000.0), 2_012.0) is None
+    # blocks of two: 100, 1000; the last episode is no whole block
+    assert goal_reached(episodes, Goal(block=2, above=500.0), 2_012.0) == 4
+
+
+def test_block_means_leave_out_a_part_of_a_block():
+    assert block_means(np.array([1, 3, 5, 7, 100], dtype=np.float32), 2).tolist() == [2.0, 6.0]
+
+
+def test_training_has_settled_near_its_end():
+    # 100 a block from the 300th of 1,000 blocks of 10 episodes on, and 0 before; failing is -100. The threshold is
+    # -100 + 0.95 * 200 = 90, which the mean of 50 blocks first has when 45 of them are good: blocks 295 to 344
+    blocks = np.where(np.arange(1_000) >= 300, 100.0, 0.0).astype(np.float32)
+    assert final_mean(blocks) == 100.0
+    assert settled(blocks, 10, -100.0) == 2_950
+    assert settled(np.full(7, 3.0, dtype=np.float32), 10, -10.0) == 0
+    # it got worse: the best that it ever was is above the threshold from the start
+    assert settled(np.arange(100, 0, -1, dtype=np.float32), 10, 0.0) == 0
+
+
+@given(st.lists(st.integers(-800, 2_000), min_size=1, max_size=200))
+def test_training_always_settles(values: list[int]):
+    assert 0 <= settled(np.array(values, dtype=np.float32), 10, -800.0) < 10 * len(values)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,7 @@ import time
 from dataclasses import replace
 from multiprocessing import active_children
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -20,16 +21,19 @@ import tests
 from tests.experiments.tiny import HOPELESS, LONG, TINY
 from tickwise.errors import ConfigurationError, DataError, StoreError, TickwiseError
 from tickwise.experiments import runner
-from tickwise.experiments.case_studies import StudySpec
+from tickwise.experiments.jobs import Job
 from tickwise.experiments.progress import Display
 from tickwise.experiments.runner import (
+    Unit,
     available_methods,
     default_workers,
     planned_jobs,
     run_study,
+    run_units,
     unfinished,
 )
 from tickwise.experiments.store import Store
+from tickwise.experiments.study import StudySpec
 
 ROOT = Path(tests.__file__).parents[1]
 METHODS = ("I", "II", "III", "IV")
@@ -62,12 +66,31 @@ def test_every_job_leaves_its_artefact(finished: Path):
     assert unfinished(TINY, store) is None
 
 
-def test_the_longest_learning_comes_first():
+def test_the_longest_learning_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    done: list[str] = []
+    real = runner.perform
+
+    def noted(job: Job, *rest: Any) -> None:
+        done.append(job.name)
+        real(job, *rest)
+
+    monkeypatch.setattr(runner, "perform", noted)
     learning = replace(TINY.learning, source_episodes=300, most_episodes={"I": 100, "III": 200, "IV": 50})
-    names = [
-        job.name for _, jobs in runner._learning(replace(TINY, runs=1, learning=learning), METHODS[2:]) for job in jobs
-    ]
-    assert names == ["learn-source-0", "learn-III-0", "learn-IV-0"]
+    run(replace(TINY, runs=1, learning=learning), tmp_path / "run")
+    assert done[3:] == ["learn-source-0", "learn-III-0", "learn-I-0", "learn-IV-0"]
+
+
+def test_several_studies_are_carried_out_phase_by_phase(tmp_path: Path):
+    other = replace(TINY, name="other", runs=1)
+    units = [Unit("a", TINY, tmp_path / "a"), Unit("b", other, tmp_path / "b")]
+    stream = io.StringIO()
+    stores = run_units(units, 1, Display(Console(file=stream)))
+    assert [line for line in stream.getvalue().splitlines() if "jobs" in line] == [
+        "Collect: 6 jobs", "Infer: 3 jobs", "Learn: 12 jobs", "Transfer: 3 jobs",
+    ]  # fmt: skip
+    assert [unfinished(unit.spec, store) for unit, store in zip(units, stores, strict=True)] == [None, None]
+    run(other, tmp_path / "alone")
+    assert artefacts(tmp_path / "alone") == artefacts(tmp_path / "b")
 
 
 def test_a_finished_study_is_left_alone(finished: Path, monkeypatch: pytest.MonkeyPatch):

@@ -35,24 +35,25 @@ def by_hand(tmp_path_factory: pytest.TempPathFactory) -> Store:
         }
         manifest = {"run": run, "source": fit, "target": target, "target_without_information": None}
         store.save(f"infer-{run}", manifest, {})
-    # blocks of ten: the first at the optimum (99.4 or so) is the third, the eighth, the first, or there is none
-    save_curve(store, "I", 0, [0, 0, 100, 0], [-10, 0, 80, 20])
-    save_curve(store, "I", 1, [0, 12, 24, 12], [-10, -10, -10, -10])
-    save_curve(store, "III", 0, [0] * 7 + [100], [-10, 100, 90, 100])
-    save_curve(store, "III", 1, [100, 4], [100, 100, 100, 100])
+    save_curve(store, "I", 0, [0, 0, 100, 0], [-10, 0, 80, 20], 30)
+    save_curve(store, "I", 1, [0, 12, 24, 12], [-10, -10, -10, -10], None)
+    save_curve(store, "III", 0, [0] * 7 + [100], [-10, 100, 90, 100], 80)
+    save_curve(store, "III", 1, [100, 4], [100, 100, 100, 100], 10)
     for run in (0, 1):
-        save_curve(store, "source", run, [1.0], [0, 1, 2, 3])
-        save_curve(store, "IV", run, [100], [0, 1, 2, 3])
+        save_curve(store, "source", run, [1.0], [0, 1, 2, 3], None)
+        save_curve(store, "IV", run, [100], [0, 1, 2, 3], 10)
     return store
 
 
-def save_curve(store: Store, method: str, run: int, blocks: list[float], returns: list[float]) -> None:
+def save_curve(
+    store: Store, method: str, run: int, blocks: list[float], returns: list[float], goal: int | None
+) -> None:
     arrays = {
         "blocks": np.array(blocks, dtype=np.float32),
         "evaluation_episodes": np.array([0, 100, 200, 300]),
         "evaluation_returns": np.array(returns, dtype=np.float64),
     }
-    store.save(f"learn-{method}-{run}", {"run": run, "episodes": 20_000}, arrays)
+    store.save(f"learn-{method}-{run}", {"run": run, "episodes": 20_000, "goal": goal}, arrays)
 
 
 @pytest.fixture(scope="module")
@@ -66,32 +67,35 @@ def test_the_summary_of_curves_that_were_made_up(results: dict[str, Any]):
     # the levels are at 77.5, 88.5 and 93.97: shares of the way from -10 to V*
     assert 99 < summary["v_star"] < 100
     assert summary["fail"] == pytest.approx(-10, abs=0.01)
-    assert one["first_block"] == [30, None]
+    assert one["goal"] == [30, None]
     assert one["reached_80"] == [200, None]
     assert one["reached_90"] == [None, None]
     assert one["stays_80"] == [None, None]
-    assert three["first_block"] == [80, 10]
+    assert three["goal"] == [80, 10]
     assert three["reached_95"] == [100, 0]
     assert three["stays_90"] == [100, 0]
     assert three["stays_95"] == [300, 0]
     assert one["episodes"] == three["episodes"] == [20_000, 20_000]
     assert one["window_mean"] == [25.0, 12.0]
+    assert one["end_mean"] == [0.0, 12.0]  # a fifth of four blocks is at least one
     assert one["statistics"]["window_mean"]["iqm"] == 18.5
-    assert one["statistics"]["first_block"]["reached"] == 1
-    assert three["statistics"]["first_block"]["mean"] == 45
+    assert one["statistics"]["goal"]["reached"] == 1
+    assert three["statistics"]["goal"]["mean"] == 45
 
 
 def test_ratios_say_where_they_are_lower_bounds(results: dict[str, Any]):
     ratios = results["summary"]["ratios"]
     # 30 and the limit of 20,000 over 80 and 10
-    assert ratios["I/III"]["first_block"] == {"value": pytest.approx(20_030 / 90), "at_least": True}
+    assert ratios["I/III"]["goal"] == {"value": pytest.approx(20_030 / 90), "at_least": True}
     assert ratios["I/III"]["reached_95"] == {"value": pytest.approx(40_000 / 101), "at_least": True}
-    assert ratios["III/IV"]["first_block"] == {"value": pytest.approx(90 / 20), "at_least": False}
+    assert ratios["III/IV"]["goal"] == {"value": pytest.approx(90 / 20), "at_least": False}
 
 
 def test_structures_are_counted(results: dict[str, Any]):
     summary = results["summary"]
-    assert summary["structures"] == {"found": 1, "transferable": 1, "of": 2}
+    # the regions of both formulas of the first run are those of the tiny worlds; x >= 3 is none
+    exact = {"source": 1, "target": 1}
+    assert summary["structures"] == {"found": 1, "transferable": 1, "exact": exact, "of": 2}
     assert (summary["transferable"], summary["reason"]) == (True, "because")
     assert summary["formulas"]["target_without_information"] is None
     assert set(summary["methods"]) == {"I", "III", "IV"}  # II has no formula

@@ -17,9 +17,10 @@ from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.tasks import ReachStayReach
 from tickwise.experiments import case_studies
-from tickwise.experiments.case_studies import CASE_STUDY_1, Collection, Learning, StudySpec
+from tickwise.experiments.case_studies import CASE_STUDY_1
 from tickwise.experiments.progress import Display
 from tickwise.experiments.runner import run_study
+from tickwise.experiments.study import Collection, Learning, StudySpec
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.tree import InferenceSettings
 from tickwise.logic.syntax import Box

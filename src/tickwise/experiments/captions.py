@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickwise.experiments.case_studies import StudySpec
-
-_MAPS = {"case1": "Fig. 6 (and of Figs. 1 and 2)", "case2": "Fig. 9 (and of Fig. 8)"}
-_CURVES = {"case1": "Fig. 7", "case2": "Fig. 10"}
+from tickwise.experiments.study import StudySpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +26,8 @@ def captions(spec: StudySpec) -> dict[str, Caption]:
     """The caption of every figure by name, drawn or not."""
     runs = f"{spec.runs} run{'s' if spec.runs != 1 else ''}"
     learning = spec.learning
-    curves = _CURVES.get(spec.name, "the figure of learning results")
+    figures = spec.published.figures
+    curves = figures.get("curves", "the figures of learning results")
     return {
         "workflow": Caption(
             "Workflow",
@@ -39,7 +37,7 @@ def captions(spec: StudySpec) -> dict[str, Caption]:
         ),
         "maps": Caption(
             "Inferred regions",
-            f"{_MAPS.get(spec.name, 'the figure of inferred regions')}, inferred regions",
+            f"{figures.get('maps', 'the figures of inferred regions')}, inferred regions",
             "Filled: inferred regions; outlined and hatched: the true ones. Thin lines: some of the first "
             "collection's trajectories with label 1, each shifted a little so that they can be told apart; a dot "
             "marks the start. (c) is inferred without the information gain.",
@@ -61,7 +59,8 @@ def captions(spec: StudySpec) -> dict[str, Caption]:
         "curves": Caption(
             "Learning curves",
             f"{curves}, left",
-            f"Left: mean returns of training episodes, in blocks of {learning.block} averaged to a hundred points. "
+            f"Left: mean returns of the first {learning.shown:,} training episodes, in blocks of {learning.block} "
+            "averaged to a hundred points. "
             f"Right: mean returns of the greedy policy, {learning.evaluation_episodes} episodes on fixed seeds, for "
             f"as long as each method learned. Lines are means over {runs}, bands 95 % bootstrap intervals of them.",
         ),
@@ -74,7 +73,16 @@ def captions(spec: StudySpec) -> dict[str, Caption]:
         "convergence": Caption(
             "Episodes to convergence",
             "the numbers of episodes in the text of Section V",
-            "A point a run, by two measures. The paper's number is the same star in both panels, since it does not "
-            "say how convergence was measured. An arrow begins at the last episode of runs that did not get there.",
+            f"A point a run, by two measures{_stars(spec)}. An arrow begins at the last episode of runs that did not "
+            "get there.",
         ),
     }
+
+
+def _stars(spec: StudySpec) -> str:
+    """What the paper's numbers in the figure are, as the end of a sentence."""
+    if spec.published.settled:
+        return "; the paper's numbers are stars, on the right those for convergence"
+    if spec.published.episodes:
+        return "; the paper's number is the same star in both panels, since it does not say how it measured convergence"
+    return ""

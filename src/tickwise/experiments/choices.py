@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.envs.tasks import ReachStayReach
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.regions import Name, overlap, ranges_text, read_formula
+from tickwise.experiments.study import StudySpec
+from tickwise.rl.qlearning import QSettings
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,14 +28,8 @@ class Choice:
 
 def choices(spec: StudySpec) -> tuple[Choice, ...]:
     """Everything that the paper leaves open in a study, with the choice made."""
-    return (*_world(spec), *_learning(spec), *_inference(spec), *_transfer(spec), *_measures(spec))
-
-
-def first_block_measure(spec: StudySpec) -> str:
-    """The measure nearest to the paper's curves, in words."""
-    return (
-        f"the first block of {spec.learning.block} training episodes whose mean return is at least the optimal value V*"
-    )
+    remarks = (Choice(*remark) for remark in spec.remarks)
+    return (*remarks, *_world(spec), *_learning(spec), *_inference(spec), *_transfer(spec), *_measures(spec))
 
 
 def _world(spec: StudySpec) -> tuple[Choice, ...]:
@@ -61,7 +56,7 @@ def _world(spec: StudySpec) -> tuple[Choice, ...]:
 
 
 def _regions(spec: StudySpec, environment: EnvironmentSpec, task: str, key: str) -> Choice:
-    published = read_formula(spec.published.formulas[key], task, environment)
+    published = read_formula(spec.published.formulas.get(key), task, environment)
     inferred = published.names if published is not None else {}
     parts = []
     for landmark in environment.task.landmarks:
@@ -72,8 +67,7 @@ def _regions(spec: StudySpec, environment: EnvironmentSpec, task: str, key: str)
         parts.append(f"{name} = {ranges_text(landmark.box)} ({origin})")
     return Choice(
         f"True regions of the {key} task",
-        "Shown in a figure only. The text says of Case Study 1 that all inferred regions are exact but Ȳᵀ, which is "
-        "different from Yᵀ and close to it.",
+        spec.published.regions or "It has no such task.",
         "; ".join(parts) + ".",
     )
 
@@ -90,33 +84,36 @@ def _learning(spec: StudySpec) -> tuple[Choice, ...]:
             f"{task.reward:g} · {settings.gamma:g}{_superscript(task.deadline)} ≈ {ahead:.0f}, and this is {side}. "
             f"With 0, the {signed(task.penalty)} at the end makes every action that was tried look bad."
         )
-    epsilon = (
-        "None (ε = 0): the initial value makes untried actions worth trying"
-        if settings.epsilon == 0
-        else f"ε = {settings.epsilon:g}"
-    )
+    criterion = "with a return above 0" if phase.least_ticks is None else f"of at least {phase.least_ticks} ticks"
+    needed = f"{phase.positives['source']} trajectories of the source and {phase.positives['target']} of the target"
     return (
         Choice("Initial Q-values", "Not given.", initial),
         Choice(
             "Exploration",
             "Not given.",
-            f"{epsilon}. Actions of equal value are drawn at random in learning; in an evaluation the lower number "
-            "wins. α and γ are the paper's.",
+            f"{_exploration(settings)}. Actions of equal value are drawn at random in learning; in an evaluation the "
+            "lower number wins. α and γ are the paper's.",
         ),
         Choice(
             "Length of the collection",
-            f"The first {spec.published.collection:,} episodes; both labels must have sufficiently many trajectories.",
-            f"{phase.episodes:,} episodes, and more, in steps of a tenth, until {phase.positives['source']} "
-            f"trajectories of the source and {phase.positives['target']} of the target have label 1 (or "
-            f"{phase.most_episodes:,} episodes have passed); {phase.negatives} of the others, drawn at random, get "
-            "label −1.",
+            f"The first {phase.episodes:,} episodes; both labels must have sufficiently many trajectories.",
+            f"{phase.episodes:,} episodes, and more, in steps of a tenth, until {needed} have label 1 (or "
+            f"{phase.most_episodes:,} episodes have passed). Label 1 is for trajectories {criterion}; "
+            f"{phase.negatives} of the others, drawn at random, get label −1.",
         ),
         Choice(
             "Learning in the source task",
             "Q̄ˢ* is optimal; for how long it was learned is not said.",
-            f"{spec.learning.source_episodes:,} episodes in each run before the transfer.",
+            f"{spec.learning.source_episodes:,} episodes in each run before the transfer. "
+            f"{_exploration(spec.learning.source)}.",
         ),
     )
+
+
+def _exploration(settings: QSettings) -> str:
+    if settings.epsilon == 0:
+        return "No random actions (ε = 0): the initial value makes untried actions worth trying"
+    return f"A random action with probability ε = {settings.epsilon:g}"
 
 
 def signed(value: float, form: str = "g") -> str:
@@ -204,7 +201,7 @@ def _measures(spec: StudySpec) -> tuple[Choice, ...]:
         Choice(
             "Convergence",
             "“Convergence to the optimal policy” is not defined; the curves are averaged for every 10 episodes.",
-            f"Two measures. (a) Nearest to the curves: {first_block_measure(spec)}. (b) The first evaluation of the "
+            f"Two measures. (a) Nearest to the curves: {spec.learning.goal.text}. (b) The first evaluation of the "
             f"greedy policy, {learning.evaluation_episodes} episodes on fixed seeds, at 80, 90 and 95 % of the way "
             "from the return of always failing to V*, and the first from which on it stays there. V* comes from exact "
             "planning on the product of the world and the hidden task.",

@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from tickwise._seeding import generator, seed_sequence
 from tickwise.envs.catalog import EnvironmentSpec
+from tickwise.envs.planning import optimal_value
 from tickwise.errors import ConfigurationError, DataError
-from tickwise.experiments.case_studies import Collection, StudySpec
+from tickwise.experiments.measures import block_means, goal_reached
 from tickwise.experiments.store import Store
+from tickwise.experiments.study import Collection, StudySpec
 from tickwise.inference.information import information_gain
 from tickwise.inference.prior import PathPrior
 from tickwise.inference.space import SearchSpace
@@ -26,7 +28,7 @@ from tickwise.inference.tree import DecisionTree, InferenceSettings, classificat
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.rl.qlearning import Problem, collect, evaluate, learn
-from tickwise.rl.states import automaton_memory, tau_memory
+from tickwise.rl.states import automaton_memory, disjunct_choice, tau_memory
 from tickwise.transfer.hypothesis import Task, tick_tables, transfer_structure
 from tickwise.transfer.qtransfer import transfer_q
 
@@ -120,39 +122,53 @@ def _collect(job: Job, spec: StudySpec, store: Store, report: Report) -> _Artefa
         returns.append(part[0])
         paths.append(part[1])
         episodes += count
-        positives += int((returns[-1] > 0).sum())
+        positives += int(desired(phase, *part).sum())
     return _labelled(job, phase, np.concatenate(returns), np.concatenate(paths), rng)
+
+
+def desired(phase: Collection, returns: NDArray[np.float32], paths: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Which episodes get label 1, by the study's criterion of performance, shape ``(episodes,)``."""
+    if phase.least_ticks is None:
+        return np.asarray(returns > 0)
+    return np.asarray(paths[:, phase.least_ticks] >= 0)
 
 
 def _labelled(
     job: Job, phase: Collection, returns: NDArray[np.float32], paths: NDArray[np.int32], rng: np.random.Generator
 ) -> _Artefact:
-    """All trajectories with a positive return, label 1, and some of the others at random, label -1."""
-    positive, other = np.flatnonzero(returns > 0), np.flatnonzero(returns <= 0)
+    """All trajectories with label 1, and some of the others at random, which get label -1."""
+    good = desired(phase, returns, paths)
+    positive, other = np.flatnonzero(good), np.flatnonzero(~good)
     if not len(positive):
         raise DataError(
             f"no trajectory of the {job.subject} task got label 1 in {len(returns):,} episodes; raise most_episodes"
         )
+    if not len(other):
+        raise DataError(f"all {len(returns):,} trajectories of the {job.subject} task got label 1; collect fewer")
     chosen = np.sort(rng.choice(other, min(phase.negatives, len(other)), replace=False))
     picked = np.concatenate([positive, chosen])
-    labels = np.where(returns[picked] > 0, 1, -1).astype(np.int8)
+    labels = np.where(good[picked], 1, -1).astype(np.int8)
     facts = {
         "run": job.run, "positives": len(positive), "negatives": len(chosen), "candidates": len(other),
         "episodes": len(returns), "of_the_first": phase.episodes,
-        "positives_of_the_first": int((returns[: phase.episodes] > 0).sum()),
+        "positives_of_the_first": int(good[: phase.episodes].sum()),
     }  # fmt: skip
     return facts, {"paths": paths[picked], "labels": labels}
 
 
 def labelled_data(spec: StudySpec, store: Store, task: str, run: int) -> LabelledTrajectories:
-    """The labelled trajectories of a collection; the state is the robot's position."""
+    """The labelled trajectories of a collection; the state is the robot's position.
+
+    Where label 1 is for lasting long, the last state of these trajectories is left out (Case Study 2).
+    """
     mdp = environment_of(spec, task).mdp()
     content = store.load(Job("collect", task, run).name)
     paths, labels = content["paths"], content["labels"]
     lengths = (paths >= 0).sum(axis=1)
     values = np.where(paths[..., None] >= 0, mdp.coordinates[paths], np.nan)
     ids = tuple(str(number) for number in range(len(paths)))
-    return LabelledTrajectories(values, lengths, labels, mdp.variables, ids)
+    data = LabelledTrajectories(values, lengths, labels, mdp.variables, ids)
+    return data if spec.collection.least_ticks is None else data.drop_last(labels == 1)
 
 
 def environment_of(spec: StudySpec, task: str) -> EnvironmentSpec:
@@ -261,7 +277,8 @@ def learning_problem(spec: StudySpec, store: Store, subject: str) -> Problem:
     formula = study_formulas(store)[names[subject]]
     if formula is None:
         raise ConfigurationError(f"{subject} needs a formula, and none was inferred; leave it out")
-    memory = automaton_memory(mdp, tick_tables(formula, environment.task.deadline))
+    tables = tick_tables(formula, environment.task.deadline)
+    memory = automaton_memory(mdp, tables, disjunct_choice(spec.learning.disjunct))
     return Problem(mdp, environment.task_table(), memory)
 
 
@@ -278,12 +295,13 @@ def evaluation_points(spec: StudySpec, episodes: int) -> list[int]:
 def _learn(job: Job, spec: StudySpec, store: Store, report: Report) -> _Artefact:
     """Q-learning (Step 3) of the source task or of one of Methods I to IV, with evaluations on fixed seeds."""
     learning, subject = spec.learning, job.subject
+    settings = learning.source if subject == "source" else learning.settings
     problem = learning_problem(spec, store, subject)
-    q = problem.initial_q(learning.settings)
+    q = problem.initial_q(settings)
     if subject == "IV":
         source = learning_problem(spec, store, "source")
         learned = store.load(Job("learn", "source", job.run).name)["q"]
-        q = transfer_q(source.mdp, source.memory, learned, problem.mdp, problem.memory, learning.settings.initial)
+        q = transfer_q(source.mdp, source.memory, learned, problem.mdp, problem.memory, settings.initial)
     rng = generator(spec.seed, spec.name, "learn", subject, job.run)
     fixed = seed_sequence(spec.seed, spec.name, "evaluate")
     episodes = learning.source_episodes if subject == "source" else learning.most_episodes[subject]
@@ -292,23 +310,18 @@ def _learn(job: Job, spec: StudySpec, store: Store, report: Report) -> _Artefact
     parts = []
     for before, now in pairwise(points):
         report(before, episodes)
-        parts.append(learn(problem, q, learning.settings, rng, now - before))
+        parts.append(learn(problem, q, settings, rng, now - before))
         values.append(evaluate(problem, q, fixed, learning.evaluation_episodes))
+    returns = np.concatenate(parts)
     arrays: dict[str, NDArray[Any]] = {
-        "blocks": _block_means(np.concatenate(parts), learning.block),
+        "blocks": block_means(returns, learning.block),
         "evaluation_episodes": np.array(points, dtype=np.int64),
         "evaluation_returns": np.array(values, dtype=np.float64),
     }
     if subject == "source":
         arrays["q"] = q
-    return {"run": job.run, "episodes": episodes}, arrays
-
-
-def _block_means(returns: NDArray[np.float32], block: int) -> NDArray[np.float32]:
-    """The mean of each whole block of episodes."""
-    whole = len(returns) // block * block
-    means: NDArray[np.float64] = returns[:whole].reshape(-1, block).mean(axis=1, dtype=np.float64)
-    return means.astype(np.float32)
+    goal = goal_reached(returns, learning.goal, optimal_value(problem.mdp, problem.task))
+    return {"run": job.run, "episodes": episodes, "goal": goal}, arrays
 
 
 _KINDS: dict[str, Callable[[Job, StudySpec, Store, Report], _Artefact]] = {

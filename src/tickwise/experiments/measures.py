@@ -9,25 +9,59 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import bootstrap, trim_mean
 
+from tickwise.experiments.study import Goal
+
 LEVELS = (80, 90, 95)
 """Shares, in percent, of the way from the always-fail return to V*."""
 
+_SMOOTHED = 500  # episodes of the moving mean
 
-def first_block(blocks: NDArray[np.float32], optimum: float, block: int) -> int | None:
-    """Episodes until the end of the first block of training episodes whose mean return is the optimum.
+
+def block_means(returns: NDArray[np.float32], block: int) -> NDArray[np.float32]:
+    """The mean of each whole block of episodes, from ``(episodes,)`` to ``(blocks,)``."""
+    whole = len(returns) // block * block
+    means: NDArray[np.float64] = returns[:whole].reshape(-1, block).mean(axis=1, dtype=np.float64)
+    return means.astype(np.float32)
+
+
+def goal_reached(returns: NDArray[np.float32], goal: Goal, optimum: float) -> int | None:
+    """Episodes until the end of the first block that meets the study's goal; None where none does.
 
     The measure nearest to the paper's curves, which are "averaged for every 10 episodes".
 
     Args:
-        blocks: Mean return of each block, shape ``(blocks,)``.
+        returns: The return of each training episode, shape ``(episodes,)``.
+        goal: The study's goal.
         optimum: The optimal value V*.
-        block: Episodes of a block.
-
-    Returns:
-        Episodes, or None where there is no such block.
     """
-    there = np.flatnonzero(blocks >= optimum)
-    return int(there[0] + 1) * block if len(there) else None
+    means = block_means(returns, goal.block)
+    there = np.flatnonzero(means >= optimum if goal.above is None else means > goal.above)
+    return int(there[0] + 1) * goal.block if len(there) else None
+
+
+def final_mean(blocks: NDArray[np.float32]) -> float:
+    """Where training ends: the mean return of the last fifth of the episodes, from the means of blocks."""
+    return float(np.asarray(blocks[-max(len(blocks) // 5, 1) :], dtype=np.float64).mean())
+
+
+def settled(blocks: NDArray[np.float32], block: int, fail: float) -> int:
+    """Episodes until training is as good as it gets: 95 % of the way from always failing to where it ends.
+
+    Where it ends is `final_mean`; a moving mean over 500 episodes has to get there, and counts from its first episode.
+
+    Args:
+        blocks: Mean return of each block, shape ``(blocks,)``.
+        block: Episodes of a block.
+        fail: The return of always failing.
+    """
+    values = np.asarray(blocks, dtype=np.float64)
+    width = min(max(_SMOOTHED // block, 1), len(values))
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    moving = (sums[width:] - sums[:-width]) / width
+    end = final_mean(blocks)
+    # the end itself may be a little less smooth than the threshold; the best moving mean always counts
+    threshold = min(fail + 0.95 * (end - fail), moving.max())
+    return int(np.flatnonzero(moving >= threshold)[0]) * block
 
 
 def reached(episodes: NDArray[np.int64], returns: NDArray[np.float64], threshold: float) -> int | None:

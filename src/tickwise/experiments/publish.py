@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from tickwise.errors import MissingFileError, StoreError
-from tickwise.experiments.case_studies import StudySpec, find_study
+from tickwise.experiments.case_studies import find_study
 from tickwise.experiments.figures import draw_figures
 from tickwise.experiments.jobs import peak_memory_mib
 from tickwise.experiments.report import render_report
 from tickwise.experiments.runner import planned_jobs, unfinished
 from tickwise.experiments.store import Store, read_configuration, read_json, write_json, write_text
+from tickwise.experiments.study import StudySpec
 from tickwise.experiments.summary import command, gather
 
 PACKAGES = ("numpy", "numba", "scipy", "gymnasium", "matplotlib")

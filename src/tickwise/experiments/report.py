@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
+from dataclasses import dataclass
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.experiments.captions import captions
-from tickwise.experiments.case_studies import StudySpec
-from tickwise.experiments.choices import choices, first_block_measure, signed
+from tickwise.experiments.choices import choices, signed
 from tickwise.experiments.regions import NamedFormula, overlap, ranges_text, read_formula
-from tickwise.experiments.verdict import count, verdict
+from tickwise.experiments.study import StudySpec
+from tickwise.experiments.verdict import count, published, verdict
 from tickwise.logic.render import to_english, to_unicode
 from tickwise.logic.syntax import Bound, Box
 
@@ -29,6 +29,10 @@ _TITLES = {
     "target": "Target task",
     "target_without_information": "Target task without the information gain (λ = 0)",
 }
+_SECTIONS = {
+    "transferability": "Transferability", "formulas": "Formulas", "learning": "Learning", "data": "Data",
+    "robustness": "Robustness", "choices": "Choices", "settings": "Settings",
+}  # fmt: skip
 _METHODS = {
     "I": "Q-learning on τ-states",
     "II": "extended states of φ′ᵀ (λ = 0)",
@@ -37,8 +41,49 @@ _METHODS = {
 }
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of a page, such as one study.
+
+    Attributes:
+        key: Its anchor.
+        title: What it is.
+        verdict: What was found, in sentences.
+        links: Anchors and labels of its sections.
+        body: The sections as HTML.
+    """
+
+    key: str
+    title: str
+    verdict: Sequence[str]
+    links: Sequence[tuple[str, str]]
+    body: Markup
+
+
+def render_page(
+    title: str, verdict: Sequence[str], parts: Sequence[Part], environment: Mapping[str, Any], *, seed: int
+) -> str:
+    """A page as HTML with everything in it: styles and figures inline, no scripts, nothing from a network.
+
+    Args:
+        title: The title.
+        verdict: What was found, in sentences.
+        parts: The parts; a single one gets no heading of its own.
+        environment: Command, versions and costs.
+        seed: The root seed.
+
+    Returns:
+        The page. All text from data is escaped; the same input gives the same page.
+    """
+    page = _template("page").render(
+        title=title, verdict=verdict, parts=parts, environment=_environment_rows(environment), seed=seed,
+        version=environment["version"], command=environment["command"],
+    )  # fmt: skip
+    return page.rstrip() + "\n"
+
+
 def render_report(results: Mapping[str, Any], spec: StudySpec, figures: Mapping[str, str]) -> str:
-    """The report as HTML with everything in it: styles and figures inline, no scripts, nothing from a network.
+    """The page of one study.
 
     Args:
         results: The results of the study.
@@ -46,32 +91,58 @@ def render_report(results: Mapping[str, Any], spec: StudySpec, figures: Mapping[
         figures: The SVG text of each figure by name; one that is missing is said to be missing.
 
     Returns:
-        The page. All text from data is escaped; the same input gives the same page.
+        The page, as `render_page` gives it.
     """
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["count"] = count
-    template = files("tickwise.experiments").joinpath("report.html.j2").read_text(encoding="utf-8")
+    part = study_part(results, spec, figures)
+    return render_page(spec.title, part.verdict, (part,), results["environment"], seed=spec.seed)
+
+
+def study_part(
+    results: Mapping[str, Any], spec: StudySpec, figures: Mapping[str, str], *, nested: bool = False
+) -> Part:
+    """One study as a part of a page.
+
+    Args:
+        results: The results of the study.
+        spec: The study.
+        figures: The SVG text of each figure by name.
+        nested: Whether other parts stand beside it, so that its anchors need the study's name before them.
+    """
     summary = results["summary"]
-    page = environment.from_string(template).render(
+    prefix = f"{spec.name}-" if nested else ""
+    body = _template("study").render(
+        h=3 if nested else 2,
+        prefix=prefix,
         spec=spec,
+        published=bool(spec.published.formulas),
         summary=summary,
-        verdict=verdict(summary, spec),
         formulas=[_formula_pair(results, spec, *entry) for entry in FORMULAS],
         convergence=[_method_row(name, summary, spec, "reached") for name in _METHODS],
         staying=[_method_row(name, summary, spec, "stays") for name in _METHODS],
         ratios=_ratio_rows(summary, spec),
-        first_block=first_block_measure(spec),
+        goal=spec.learning.goal.text,
+        heading=_capital(spec.learning.goal.heading),
         reason=_sentence(summary["reason"]),
         fail=signed(summary["fail"]),
         collections=results["collections"],
         robustness=[_robust_row(inference, spec) for inference in results["inferences"]],
-        figures=_figures(spec, figures),
+        figures=_figures(spec, figures, prefix),
         settings=settings_tree(spec.as_dict()),
         choices=choices(spec),
-        environment=_environment_rows(results["environment"]),
         command=summary["command"],
     )
-    return page.rstrip() + "\n"
+    links = [(prefix + name, label) for name, label in _SECTIONS.items()]
+    return Part(spec.name, spec.title, verdict(summary, spec), links, Markup(body))
+
+
+def _template(name: str) -> Template:
+    """A template of this package; it escapes what it is given."""
+    environment = Environment(
+        loader=PackageLoader("tickwise.experiments"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters["count"] = count
+    return environment.get_template(f"{name}.html.j2")
 
 
 def inline_svg(name: str, svg: str) -> Markup:
@@ -110,17 +181,21 @@ def settings_tree(value: Any) -> Any:
 def _sentence(reason: str) -> str:
     """A reason as a sentence of its own, after the answer that it is the reason of."""
     text = reason.removeprefix("Logical transferability is not identified: ")
-    return text[:1].upper() + text[1:] + ("" if text.endswith(".") else ".")
+    return _capital(text) + ("" if text.endswith(".") else ".")
 
 
-def _figures(spec: StudySpec, figures: Mapping[str, str]) -> dict[str, dict[str, Any]]:
+def _capital(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _figures(spec: StudySpec, figures: Mapping[str, str], prefix: str) -> dict[str, dict[str, Any]]:
     return {
         name: {
-            "name": name,
+            "name": prefix + name,
             "title": caption.title,
             "caption": caption.text,
-            "counterpart": caption.counterpart,
-            "svg": inline_svg(name, figures[name]) if name in figures else None,
+            "counterpart": caption.counterpart if spec.published.formulas else "",
+            "svg": inline_svg(prefix + name, figures[name]) if name in figures else None,
         }
         for name, caption in captions(spec).items()
     }
@@ -130,12 +205,12 @@ def _formula_pair(results: Mapping[str, Any], spec: StudySpec, key: str, task: s
     """One formula of ours beside the paper's."""
     environment = spec.source if task == "S" else spec.target
     ours = read_formula(results["summary"]["formulas"][key], task, environment, primed=primed)
-    published = read_formula(spec.published.formulas.get(key), task, environment, primed=primed)
+    theirs = read_formula(spec.published.formulas.get(key), task, environment, primed=primed)
     facts = _facts(results["inferences"][0], key) if results["inferences"] else {}
     return {
         "title": _TITLES[key],
         "ours": _formula(ours, environment),
-        "paper": _formula(published, environment),
+        "paper": _formula(theirs, environment),
         "facts": facts,
     }
 
@@ -180,25 +255,25 @@ def _facts(inference: Mapping[str, Any], key: str) -> Mapping[str, Any]:
 
 
 def _method_row(name: str, summary: Mapping[str, Any], spec: StudySpec, kind: str) -> dict[str, Any]:
-    episodes = spec.published.episodes.get(name)
     method = summary["methods"].get(name)
-    row: dict[str, Any] = {
-        "name": name,
-        "meaning": _METHODS[name],
-        "paper": count(episodes) if episodes is not None else "not within 2,000,000",
-        "cells": None,
-    }
+    paper = published(spec, name)
+    if name in spec.published.settled:
+        paper += f"; settled {count(spec.published.settled[name])}"
+    row: dict[str, Any] = {"name": name, "meaning": _METHODS[name], "paper": paper, "cells": None}
     if method is None:
         return row
     limit = max(method["episodes"])
-    columns = ["first_block"] if kind == "reached" else []
+    columns = ["goal"] if kind == "reached" else []
     columns += [f"{kind}_{level}" for level in LEVELS]
+    columns += ["settled"] if kind == "reached" else []
     row["cells"] = [_cell(method["statistics"][column], len(method["episodes"]), limit) for column in columns]
-    window = method["statistics"]["window_mean"]
-    row["window"] = {
-        "text": signed(window["iqm"], ".1f"),
-        "note": f"{signed(window['low'], '.1f')} to {signed(window['high'], '.1f')}",
-    }
+    row["means"] = [
+        {
+            "text": signed(found["iqm"], ".1f"),
+            "note": f"{signed(found['low'], '.1f')} to {signed(found['high'], '.1f')}",
+        }
+        for found in (method["statistics"][key] for key in ("window_mean", "end_mean"))
+    ]
     return row
 
 
@@ -218,7 +293,7 @@ def _cell(statistics: Mapping[str, Any], runs: int, limit: int) -> dict[str, str
 
 def _ratio_rows(summary: Mapping[str, Any], spec: StudySpec) -> list[dict[str, Any]]:
     """How many times fewer episodes one method needs than another."""
-    measures = ("first_block", *(f"reached_{level}" for level in LEVELS))
+    measures = ("goal", *(f"reached_{level}" for level in LEVELS), "settled")
     rows = []
     for pair, ratios in summary["ratios"].items():
         slow, fast = (spec.published.episodes.get(name) for name in pair.split("/"))

@@ -1,4 +1,4 @@
-"""Carries out a study: its jobs phase by phase over the cores, skipping what is finished."""
+"""Carries out studies: their jobs phase by phase over the cores, skipping what is finished."""
 
 from __future__ import annotations
 
@@ -10,54 +10,96 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import cache
 from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 
 from tickwise.errors import ConfigurationError, TickwiseError
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.jobs import Job, perform, study_formulas
 from tickwise.experiments.progress import Board, Display, Item, board
 from tickwise.experiments.store import Store
+from tickwise.experiments.study import StudySpec
 
-Phase = tuple[str, list[Job]]
-"""A name, and jobs that need artefacts of earlier phases only."""
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A study to carry out, and where.
+
+    Attributes:
+        label: What tells it from others that are carried out with it; empty where it is alone.
+        spec: The study.
+        folder: Its run folder.
+    """
+
+    label: str
+    spec: StudySpec
+    folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """A job of a unit."""
+
+    unit: Unit
+    store: Store
+    job: Job
+
+    @property
+    def title(self) -> str:
+        return f"{self.unit.label}: {self.job.title}" if self.unit.label else self.job.title
+
+    @property
+    def weight(self) -> int:
+        """How long it takes, relative to others of its phase."""
+        return _episodes(self.unit.spec, self.job.subject) if self.job.kind == "learn" else 1
+
+
+_Phase = tuple[str, list[Job]]
+"""A name, and jobs of a study that need artefacts of earlier phases only."""
 
 
 def run_study(spec: StudySpec, folder: Path, workers: int, display: Display) -> Store:
-    """Do all jobs of a study; what an earlier call finished in the same folder is kept.
+    """Do all jobs of one study; see `run_units`."""
+    return run_units([Unit("", spec, folder)], workers, display)[0]
 
-    The numbers depend on the specification alone, not on the number of workers or on interruptions.
+
+def run_units(units: Sequence[Unit], workers: int, display: Display) -> list[Store]:
+    """Do all jobs of some studies, phase by phase; what an earlier call finished in the same folders is kept.
+
+    The numbers depend on the specifications alone, not on the number of workers or on interruptions.
 
     Args:
-        spec: The study.
-        folder: The run folder.
+        units: The studies, each with a folder of its own.
         workers: Processes that work at the same time; with 1 the work is done in this process.
         display: Shows the progress.
 
     Returns:
-        The folder's artefacts.
+        The artefacts of each study.
 
     Raises:
         ConfigurationError: If there is not at least one worker.
-        StoreError: If the folder belongs to another configuration or cannot be written.
+        StoreError: If a folder belongs to another configuration or cannot be written.
         TickwiseError: If a job cannot be done; finished jobs are kept.
         KeyboardInterrupt: On Ctrl-C or SIGTERM; finished jobs are kept.
     """
     if workers < 1:
         raise ConfigurationError(f"there are {workers} workers; use 1 or more")
-    store = Store.open(folder, spec.as_dict())
+    stores = [Store.open(unit.folder, unit.spec.as_dict()) for unit in units]
     try:
         with _pool(workers) as pool:
-            for phase in _preparation(spec):
-                _carry_out(phase, spec, store, pool, display)
-            for phase in _learning(spec, available_methods(spec, store)):
-                _carry_out(phase, spec, store, pool, display)
+            _carry_out([_preparation(unit.spec) for unit in units], units, stores, pool, display)
+            learning = [
+                _learning(unit.spec, available_methods(unit.spec, store))
+                for unit, store in zip(units, stores, strict=True)
+            ]
+            _carry_out(learning, units, stores, pool, display)
     except BaseException:
-        store.sweep()
+        for store in stores:
+            store.sweep()
         raise
-    return store
+    return stores
 
 
 def default_workers() -> int:
@@ -94,19 +136,18 @@ def unfinished(spec: StudySpec, store: Store) -> Job | None:
     return next((job for job in planned_jobs(spec, store) if not store.has(job.name)), None)
 
 
-def _preparation(spec: StudySpec) -> list[Phase]:
+def _preparation(spec: StudySpec) -> list[_Phase]:
     return [
         ("Collect", _jobs(spec, "collect", ("source", "target"))),
         ("Infer", _jobs(spec, "infer", ("",))),
     ]
 
 
-def _learning(spec: StudySpec, methods: Sequence[str]) -> list[Phase]:
-    """The phases that learn; the longest jobs come first, so that the cores have work to the end."""
+def _learning(spec: StudySpec, methods: Sequence[str]) -> list[_Phase]:
+    """The phases that learn."""
     transfer = "IV" in methods
     learners = [method for method in methods if method != "IV"] + ["source"] * transfer
-    learners.sort(key=lambda subject: -_episodes(spec, subject))
-    phases = [("Learn", _jobs(spec, "learn", learners))]
+    phases = [("Learn", _jobs(spec, "learn", learners))] if learners else []
     return phases + [("Transfer", _jobs(spec, "learn", ("IV",)))] * transfer
 
 
@@ -118,16 +159,36 @@ def _episodes(spec: StudySpec, subject: str) -> int:
     return spec.learning.source_episodes if subject == "source" else spec.learning.most_episodes[subject]
 
 
-def _carry_out(phase: Phase, spec: StudySpec, store: Store, pool: ProcessPoolExecutor | None, display: Display) -> None:
-    name, jobs = phase
-    left = [job for job in jobs if not store.has(job.name)]
+def _carry_out(
+    plans: Sequence[list[_Phase]],
+    units: Sequence[Unit],
+    stores: Sequence[Store],
+    pool: ProcessPoolExecutor | None,
+    display: Display,
+) -> None:
+    """The phases of all units, those of the same name together."""
+    for name in dict.fromkeys(name for plan in plans for name, _ in plan):
+        pieces = [
+            _Piece(unit, store, job)
+            for plan, unit, store in zip(plans, units, stores, strict=True)
+            for phase, jobs in plan
+            if phase == name
+            for job in jobs
+        ]
+        pieces.sort(key=lambda piece: -piece.weight)  # the longest first, so that the cores have work to the end
+        _phase(name, pieces, pool, display)
+
+
+def _phase(name: str, pieces: Sequence[_Piece], pool: ProcessPoolExecutor | None, display: Display) -> None:
+    left = [piece for piece in pieces if not piece.store.has(piece.job.name)]
     if not left:
-        display.skip(name, len(jobs))
+        display.skip(name, len(pieces))
         return
-    weights = [_episodes(spec, job.subject) if job.kind == "learn" else 1 for job in left]
-    items = [Item(job.title, job.unit, weight) for job, weight in zip(left, weights, strict=True)]
-    with board(len(left)) as shared, display.phase(name, items, shared, len(jobs) - len(left)) as finish:
-        tasks = [(os.getpid(), index, job, spec, store, shared) for index, job in enumerate(left)]
+    items = [Item(piece.title, piece.job.unit, piece.weight) for piece in left]
+    with board(len(left)) as shared, display.phase(name, items, shared, len(pieces) - len(left)) as finish:
+        tasks = [
+            (os.getpid(), index, piece.job, piece.unit.spec, piece.store, shared) for index, piece in enumerate(left)
+        ]
         for index in _results(pool, tasks):
             finish(index)
 

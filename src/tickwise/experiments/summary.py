@@ -5,20 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from tickwise.envs.planning import optimal_value, worst_value
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.jobs import Job, environment_of, labelled_data, study_formulas
 from tickwise.experiments.measures import (
     LEVELS,
     episode_statistics,
-    first_block,
+    final_mean,
     ratio,
     reached,
     return_statistics,
+    settled,
     stays,
 )
+from tickwise.experiments.regions import boxes_of, overlap
 from tickwise.experiments.runner import available_methods
 from tickwise.experiments.store import Store
+from tickwise.experiments.study import StudySpec
 from tickwise.logic.parse import parse
+from tickwise.logic.sdnf import to_sdnf
 from tickwise.logic.structure import structure
 
 PAIRS = (("I", "III"), ("III", "IV"))
@@ -62,7 +65,7 @@ def gather(spec: StudySpec, store: Store, version: str) -> dict[str, Any]:
         "study": spec.name, "quick": spec.short, "seed": spec.seed, "runs": spec.runs, "version": version,
         "command": command(spec), "formulas": formulas,
         "transferable": inferences[0]["target"]["transferable"], "reason": inferences[0]["target"]["reason"],
-        "structures": _structures(spec, inferences),
+        "structures": _structures(spec, inferences), "goal": spec.learning.goal.text,
         "v_star": values["target"][0], "fail": values["target"][1], "source_v_star": values["source"][0],
         "methods": {name: _method_summary(spec, results) for name, results in methods.items()},
         "ratios": _ratios(spec, methods), "collections": collections,
@@ -101,15 +104,16 @@ def _run(spec: StudySpec, store: Store, method: str, run: int, values: tuple[flo
     window = spec.learning.window // spec.learning.block
     return {
         **content,
-        "first_block": first_block(content["blocks"], best, spec.learning.block),
+        "settled": settled(content["blocks"], spec.learning.block, fail),
         "reached": {level: reached(episodes, returns, value) for level, value in thresholds.items()},
         "stays": {level: stays(episodes, returns, value) for level, value in thresholds.items()},
         "window_mean": float(content["blocks"][:window].mean(dtype="float64")),
+        "end_mean": final_mean(content["blocks"]),
     }
 
 
 def _measures(results: list[dict[str, Any]]) -> dict[str, list[int | None]]:
-    measures = {"first_block": [result["first_block"] for result in results]}
+    measures = {name: [result[name] for result in results] for name in ("goal", "settled")}
     for kind in ("reached", "stays"):
         for level in LEVELS:
             measures[f"{kind}_{level}"] = [result[kind][str(level)] for result in results]
@@ -118,13 +122,13 @@ def _measures(results: list[dict[str, Any]]) -> dict[str, list[int | None]]:
 
 def _method_summary(spec: StudySpec, results: list[dict[str, Any]]) -> dict[str, Any]:
     measures = _measures(results)
-    means = [result["window_mean"] for result in results]
+    means = {name: [result[name] for result in results] for name in ("window_mean", "end_mean")}
     statistics: dict[str, Any] = {name: episode_statistics(values, spec.seed) for name, values in measures.items()}
-    statistics["window_mean"] = return_statistics(means, spec.seed)
+    statistics |= {name: return_statistics(values, spec.seed) for name, values in means.items()}
     return {
         **measures,
+        **means,
         "episodes": [result["episodes"] for result in results],
-        "window_mean": means,
         "statistics": statistics,
     }
 
@@ -140,11 +144,21 @@ def _ratios(spec: StudySpec, methods: dict[str, list[dict[str, Any]]]) -> dict[s
 
 
 def _structures(spec: StudySpec, inferences: list[dict[str, Any]]) -> dict[str, Any]:
-    """In how many collections the published structure was found, and transferability identified."""
-    wanted = structure(parse(spec.published.formulas["source"]))
+    """In how many collections the structure was found, transferability identified, and all regions exact."""
+    wanted = structure(parse(spec.reference))
     found = [
         text is not None and structure(parse(text)) == wanted
         for text in (inference["source"]["formula"] for inference in inferences)
     ]
     transferable = [bool(inference["target"]["transferable"]) for inference in inferences]
-    return {"found": sum(found), "transferable": sum(transferable), "of": len(inferences)}
+    exact = {task: sum(_exact(spec, task, inference[task]["formula"]) for inference in inferences) for task in TASKS}
+    return {"found": sum(found), "transferable": sum(transferable), "exact": exact, "of": len(inferences)}
+
+
+def _exact(spec: StudySpec, task: str, formula: str | None) -> bool:
+    """Whether every region of a formula is a true one."""
+    if formula is None:
+        return False
+    environment = environment_of(spec, task)
+    true, size = [landmark.box for landmark in environment.task.landmarks], environment.world.size
+    return all(any(overlap(box, other, size) == 1 for other in true) for box in boxes_of(to_sdnf(parse(formula))))

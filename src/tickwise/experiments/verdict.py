@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from tickwise.experiments.case_studies import StudySpec
+from tickwise.experiments.study import StudySpec
 
 
 def count(value: float | None) -> str:
@@ -48,22 +48,23 @@ def _transferability(summary: Mapping[str, Any]) -> str:
 
 
 def _method(summary: Mapping[str, Any], spec: StudySpec, name: str, subject: str) -> str:
-    """How fast a method was by the first block at the optimum, beside the paper's number."""
+    """How fast a method got to the study's goal, beside the paper's number."""
     method = summary["methods"][name]
-    found, runs = method["statistics"]["first_block"], len(method["episodes"])
-    block = f"block of {spec.learning.block} episodes at the optimum"
+    found, runs = method["statistics"]["goal"], len(method["episodes"])
+    goal = spec.learning.goal.short
     if found["reached"] == runs and found["mean"] is not None:
-        text = f"{subject}, the first {block} came after {count(found['mean'])} episodes on average over {runs} runs"
+        text = f"{subject}, the first {goal} came after {count(found['mean'])} episodes on average over {runs} runs"
     else:
         limit = count(max(method["episodes"]))
-        text = f"{subject}, {found['reached']} of {runs} runs had a {block} within {limit} episodes"
-    return text + _ratio(summary, name) + f" (paper: {_published(spec, name)})."
+        text = f"{subject}, {found['reached']} of {runs} runs had {article(goal)} within {limit} episodes"
+    paper = f" (paper: {published(spec, name)})" if spec.published.episodes else ""
+    return text + _ratio(summary, name) + paper + "."
 
 
 def _ratio(summary: Mapping[str, Any], name: str) -> str:
     """How the method compares with the next better or worse one, as the end of a sentence."""
     pair = {"IV": "III/IV", "I": "I/III"}.get(name, "")
-    ratio = summary["ratios"].get(pair, {}).get("first_block")
+    ratio = summary["ratios"].get(pair, {}).get("goal")
     if ratio is None or ratio["value"] is None:
         return ""
     least = "at least " if ratio["at_least"] else ""
@@ -72,6 +73,14 @@ def _ratio(summary: Mapping[str, Any], name: str) -> str:
     return f", {least}{ratio['value']:.1f} times as many as Method III"
 
 
-def _published(spec: StudySpec, name: str) -> str:
-    episodes = spec.published.episodes.get(name)
+def published(spec: StudySpec, name: str) -> str:
+    """The paper's number of episodes of a method; a dash where it has none."""
+    if name not in spec.published.episodes:
+        return "–"
+    episodes = spec.published.episodes[name]
     return "not within 2,000,000" if episodes is None else count(episodes)
+
+
+def article(noun: str) -> str:
+    """A noun with its indefinite article."""
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"

@@ -103,6 +103,60 @@ def nearest_centroid(mdp: TabularMDP, tables: Sequence[TickTable]) -> NDArray[np
     return np.asarray(distance.argmin(axis=1), dtype=np.int32)
 
 
+def nearest_region(mdp: TabularMDP, tables: Sequence[TickTable]) -> NDArray[np.int32]:
+    """Choose the disjunct whose first predicate's region itself is nearest to the state, ties as `nearest_centroid`.
+
+    Args:
+        mdp: The world.
+        tables: The tick table of each disjunct.
+
+    Returns:
+        The index of the nearest disjunct for each state, shape ``(states,)``.
+    """
+    columns = []
+    for table in tables:
+        ranges = {bound.variable: bound for bound in table.automaton.conjunction.primitives[0].box.bounds}
+        low, high = (
+            np.array([getattr(ranges[name], side) if name in ranges else open_end for name in mdp.variables])
+            for side, open_end in (("lower", -np.inf), ("upper", np.inf))
+        )
+        outside = mdp.coordinates - np.clip(mdp.coordinates, low, high)
+        columns.append(np.linalg.norm(outside, axis=1))
+    centroid = nearest_centroid(mdp, tables)
+    distance = np.round(np.stack(columns, axis=1), 9)
+    nearest = distance == distance.min(axis=1, keepdims=True)
+    tie = nearest[np.arange(len(centroid)), centroid]
+    return np.where(tie, centroid, nearest.argmax(axis=1)).astype(np.int32)
+
+
+def first_disjunct(mdp: TabularMDP, tables: Sequence[TickTable]) -> NDArray[np.int32]:
+    """Choose the first disjunct always: a baseline that makes no use of the others, shape ``(states,)``."""
+    del tables
+    return np.zeros(mdp.n_states, dtype=np.int32)
+
+
+DISJUNCT_CHOICES: dict[str, DisjunctChoice] = {
+    "nearest_centroid": nearest_centroid,
+    "nearest_region": nearest_region,
+    "first_disjunct": first_disjunct,
+}
+"""The strategies by name; the first is the paper's example. A study names one, and another may be added here."""
+
+
+def disjunct_choice(name: str) -> DisjunctChoice:
+    """The strategy of a name.
+
+    Raises:
+        ConfigurationError: If there is none.
+    """
+    if name not in DISJUNCT_CHOICES:
+        raise ConfigurationError(
+            f"there is no choice of the disjunct {name!r}; use {', '.join(DISJUNCT_CHOICES)}, or add yours to "
+            "DISJUNCT_CHOICES"
+        )
+    return DISJUNCT_CHOICES[name]
+
+
 def automaton_memory(mdp: TabularMDP, tables: Sequence[TickTable], choose: DisjunctChoice = nearest_centroid) -> Memory:
     """The memory of extended states X = ∪ X_i: location and clock valuation of the chosen disjunct's automaton.
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 from tickwise.automata.model import TimedAutomaton
 from tickwise.errors import AutomatonError
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.store import write_bytes
+from tickwise.experiments.study import StudySpec
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,7 +16,6 @@ from tickwise.automata.interchange import fill, layout
 from tickwise.automata.mapping import bijections
 from tickwise.automata.model import Edge, TimedAutomaton
 from tickwise.errors import AutomatonError
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.figures.style import INK, LINE, MUTED, PAPER, WIDTH, blank, canvas, literal
 from tickwise.experiments.regions import (
     NamedFormula,
@@ -24,6 +23,7 @@ from tickwise.experiments.regions import (
     math_symbol,
     read_formula,
 )
+from tickwise.experiments.study import StudySpec
 from tickwise.logic.render import to_unicode
 
 _RADIUS = 0.27

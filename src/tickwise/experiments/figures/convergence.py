@@ -12,9 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from tickwise.experiments.case_studies import StudySpec
-from tickwise.experiments.figures.curves import short
+from tickwise.experiments.figures.curves import return_limits, short
 from tickwise.experiments.figures.style import GREEN, INK, METHODS, MUTED, PAPER, canvas, thousands
+from tickwise.experiments.study import StudySpec
 
 
 def draw_boxplot(results: Mapping[str, Any], spec: StudySpec) -> Figure | None:
@@ -46,7 +46,7 @@ def draw_boxplot(results: Mapping[str, Any], spec: StudySpec) -> Figure | None:
     )  # fmt: skip
     labels = [f"Method {name}\n{METHODS[name].meaning}" for name in methods]
     axes.set_xticks(range(len(methods)), labels)
-    axes.set(xlim=(-0.6, len(methods) - 0.4), ylim=(results["summary"]["fail"] - 4, v_star * 1.1))
+    axes.set(xlim=(-0.6, len(methods) - 0.4), ylim=return_limits(results["summary"]))
     axes.set_ylabel(f"mean return of {thousands(spec.learning.window)} episodes")
     axes.grid(True, axis="y")
     return figure
@@ -59,15 +59,12 @@ def draw_convergence(results: Mapping[str, Any], spec: StudySpec) -> Figure | No
         return None
     height = 1.55 + 0.72 * len(methods)
     figure = canvas(height)
-    panels: tuple[tuple[str, Callable[[Mapping[str, Any]], int | None]], ...] = (
-        (f"First block of {spec.learning.block} episodes at V*", lambda run: run["first_block"]),
-        ("Greedy policy at 90 % of V*", lambda run: run["reached"]["90"]),
-    )
-    for number, (title, measure) in enumerate(panels):
+    panels = _panels(spec)
+    for number, (title, measure, published) in enumerate(panels):
         axes = figure.add_axes((0.105 + 0.455 * number, 1.08 / height, 0.425, 1 - 1.48 / height))
         for place, (name, runs) in enumerate(methods.items()):
             _runs(axes, place, name, [measure(run) for run in runs], [run["episodes"] for run in runs])
-            _published(axes, place, spec, name)
+            _published(axes, place, published, name)
         axes.set(xscale="log", ylim=(len(methods) - 0.45, -0.6), xlabel="episodes (log scale)")
         axes.set_yticks(range(len(methods)), [f"Method {name}" for name in methods] if number == 0 else [])
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: short(value)))
@@ -75,15 +72,28 @@ def draw_convergence(results: Mapping[str, Any], spec: StudySpec) -> Figure | No
         axes.grid(True, axis="x")
         axes.tick_params(axis="y", length=0)
         axes.set_title(title)
-    shown = [run[key] for runs in methods.values() for run in runs for key in ("first_block", "episodes")]
-    shown += [run["reached"]["90"] for runs in methods.values() for run in runs]
-    shown += [spec.published.episodes.get(name) for name in methods]
+    shown = [measure(run) for runs in methods.values() for run in runs for _, measure, _ in panels]
+    shown += [run["episodes"] for runs in methods.values() for run in runs]
+    shown += [published.get(name) for name in methods for _, _, published in panels]
     low = 0.6 * max(1, min(value for value in shown if value is not None))
+    most = max(PUBLISHED_LIMIT if spec.published.episodes else 0, *(value for value in shown if value is not None))
     for axes in figure.axes:
-        axes.set_xlim(low, _ROOM * PUBLISHED_LIMIT)
+        axes.set_xlim(low, most * (most / low) ** _ROOM)
         axes.xaxis.set_major_locator(FixedLocator([10.0**power for power in range(7) if 10.0**power >= low]))
     _legend(figure)
     return figure
+
+
+_Panel = tuple[str, Callable[[Mapping[str, Any]], int | None], Mapping[str, int | None]]
+"""A title, a measure of a run, and the paper's numbers."""
+
+
+def _panels(spec: StudySpec) -> tuple[_Panel, _Panel]:
+    heading = spec.learning.goal.heading
+    goal: _Panel = (heading[:1].upper() + heading[1:], lambda run: run["goal"], spec.published.episodes)
+    if spec.published.settled:
+        return goal, ("Training has settled", lambda run: run["settled"], spec.published.settled)
+    return goal, ("Greedy policy at 90 % of V*", lambda run: run["reached"]["90"], spec.published.episodes)
 
 
 def _present(results: Mapping[str, Any]) -> dict[str, Any]:
@@ -110,10 +120,10 @@ def _runs(axes: Axes, place: int, name: str, values: Sequence[int | None], limit
         axes.plot([mean, mean], [place - 0.16, place + 0.36], color=look.colour, linewidth=2.6, zorder=5)
 
 
-def _published(axes: Axes, place: int, spec: StudySpec, name: str) -> None:
-    if name not in spec.published.episodes:
+def _published(axes: Axes, place: int, published: Mapping[str, int | None], name: str) -> None:
+    if name not in published:
         return
-    episodes = spec.published.episodes[name]
+    episodes = published[name]
     x, y = PUBLISHED_LIMIT if episodes is None else episodes, place - 0.3
     if episodes is None:
         _onwards(axes, (x, y), INK)
@@ -134,7 +144,7 @@ def _onwards(axes: Axes, place: tuple[float, float], colour: str, text: str = ""
 PUBLISHED_LIMIT = 2_000_000
 """Where the paper says that a method does not converge, it had so many episodes."""
 
-_ROOM = 9  # for arrows and what they say
+_ROOM = 0.27  # share of the axis for arrows and what they say
 
 
 def _legend(figure: Figure) -> None:

@@ -12,10 +12,9 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
 from numpy.typing import NDArray
 
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.figures.style import GREEN, METHODS, canvas
+from tickwise.experiments.study import StudySpec
 
-_SHOWN = 50_000
 _BINS = 100
 _BINS_A_DECADE = 12
 _RESAMPLES = 2_000
@@ -25,22 +24,22 @@ Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 def draw(results: Mapping[str, Any], spec: StudySpec) -> Figure | None:
-    """Returns in training over the first 50,000 episodes, and of the greedy policy over all on a log axis."""
+    """Returns in training over the first episodes, and of the greedy policy over all on a log axis."""
     methods = {name: results["methods"][name] for name in METHODS if results["methods"].get(name)}
     if not methods:
         return None
     figure = canvas(4.6)
-    left = figure.add_axes((0.07, 0.235, 0.40, 0.675))
-    right = figure.add_axes((0.575, 0.235, 0.41, 0.675), sharey=left)
+    left = figure.add_axes((0.085, 0.235, 0.395, 0.675))
+    right = figure.add_axes((0.59, 0.235, 0.395, 0.675), sharey=left)
     for name, runs in methods.items():
-        _band(left, name, training_curve(runs, spec.learning.block))
+        _band(left, name, training_curve(runs, spec.learning.block, spec.learning.shown))
         _band(right, name, evaluation_curve(runs))
     for axes in (left, right):
         _optimum(axes, results["summary"]["v_star"])
         axes.grid(True)
-        axes.set_ylim(results["summary"]["fail"] - 4, results["summary"]["v_star"] * 1.1)
+        axes.set_ylim(*return_limits(results["summary"]))
     left.set(
-        xlim=(0, _SHOWN),
+        xlim=(0, spec.learning.shown),
         xlabel="episodes (thousands)",
         ylabel=f"mean return of {spec.learning.block} episodes",
     )
@@ -54,10 +53,16 @@ def draw(results: Mapping[str, Any], spec: StudySpec) -> Figure | None:
     return figure
 
 
-def training_curve(runs: Sequence[Mapping[str, Any]], block: int) -> Curve:
-    """Returns in the first 50,000 training episodes, averaged over bins of whole blocks."""
-    count = min(_SHOWN // block, *(len(run["blocks"]) for run in runs))
-    width = max(1, _SHOWN // block // _BINS)
+def return_limits(summary: Mapping[str, Any]) -> tuple[float, float]:
+    """The range of an axis of returns: from always failing to V*, and some room."""
+    room = 0.04 * (summary["v_star"] - summary["fail"])
+    return summary["fail"] - room, summary["v_star"] + 2.5 * room
+
+
+def training_curve(runs: Sequence[Mapping[str, Any]], block: int, shown: int) -> Curve:
+    """Returns in the first training episodes, averaged over bins of whole blocks."""
+    count = min(shown // block, *(len(run["blocks"]) for run in runs))
+    width = max(1, shown // block // _BINS)
     bins = max(1, count // width)
     episodes = np.asarray((np.arange(bins) + 0.5) * width * block, dtype=np.float64)
     rows = np.stack([np.asarray(run["blocks"][:count], dtype=np.float64) for run in runs])

@@ -15,7 +15,6 @@ from matplotlib.patheffects import withStroke
 
 from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.envs.tasks import Landmark
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.figures.style import (
     INK,
     LANDMARK_COLOURS,
@@ -26,6 +25,7 @@ from tickwise.experiments.figures.style import (
     canvas,
 )
 from tickwise.experiments.regions import Name, NamedFormula, clip, math_symbol, overlap, read_formula
+from tickwise.experiments.study import StudySpec
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.syntax import Box
 
@@ -44,6 +44,7 @@ def draw(results: Mapping[str, Any], spec: StudySpec) -> Figure:
         ("(c)", "target_without_information", "T", "target", True),
     )
     figure = canvas(3.85)
+    colour = LANDMARK_COLOURS["green"]
     for number, (letter, key, task, place, primed) in enumerate(panels):
         environment: EnvironmentSpec = spec.source if place == "source" else spec.target
         axes = figure.add_axes((0.047 + number * 0.3235, 0.215, 0.295, 0.69))
@@ -58,8 +59,9 @@ def draw(results: Mapping[str, Any], spec: StudySpec) -> Figure:
             _say(axes, environment, "no formula was inferred")
         else:
             _inferred_regions(axes, formula, environment)
+            colour = _colour(next(iter(formula.names)), environment)
         axes.set_title(f"{letter} ${math_symbol(task, primed=primed)}$, {place}" + (r", $\lambda=0$" if primed else ""))
-    _legend(figure)
+    _legend(figure, colour)
     return figure
 
 
@@ -149,12 +151,11 @@ def _say(axes: Axes, environment: EnvironmentSpec, text: str) -> None:
     )  # fmt: skip
 
 
-def _legend(figure: Figure) -> None:
+def _legend(figure: Figure, colour: str) -> None:
     handles = [
         Patch(facecolor="none", edgecolor=INK, hatch="///", linewidth=1.6,
               label="true region (hidden from the learner)"),
-        Patch(facecolor=to_rgba(LANDMARK_COLOURS["green"], 0.42), edgecolor=LANDMARK_COLOURS["green"],
-              linewidth=2, label="inferred region"),
+        Patch(facecolor=to_rgba(colour, 0.42), edgecolor=colour, linewidth=2, label="inferred region"),
         Line2D([], [], color=MUTED, linewidth=1, marker="o", markersize=3, label="trajectories with label 1"),
     ]  # fmt: skip
     figure.legend(handles=handles, loc="lower center", ncols=3, handlelength=2.2, columnspacing=2)

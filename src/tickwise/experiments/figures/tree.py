@@ -9,7 +9,6 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.figures.style import (
     GREEN,
     INK,
@@ -25,6 +24,7 @@ from tickwise.experiments.figures.style import (
     note,
 )
 from tickwise.experiments.regions import Name, boxes_of, math_primitive, math_symbol, name_boxes, ranges_text
+from tickwise.experiments.study import StudySpec
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.logic.syntax import Box

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from tickwise.automata.build import timed_automata
-from tickwise.experiments.case_studies import StudySpec
 from tickwise.experiments.figures.style import (
     GREEN,
     INK,
@@ -26,10 +25,11 @@ from tickwise.experiments.figures.style import (
     thousands,
 )
 from tickwise.experiments.regions import NamedFormula, math_primitive, math_symbol, read_formula
+from tickwise.experiments.study import StudySpec
 
 _LEFT, _MIDDLE, _RIGHT = 2.25, 4.5, 6.75
 _HEIGHT = 8.6
-_ROWS = {"collect": 7.6, "label": 6.4, "infer": 5.05, "decide": 3.75, "automaton": 2.35, "learn": 0.95}
+_ROWS = {"collect": 7.6, "label": 6.4, "infer": 5.05, "decide": 3.75, "automaton": 2.35, "learn": 1.0}
 _SOURCE_FACE, _TARGET_FACE = "#FDF3E1", "#E8F3FB"
 
 
@@ -135,12 +135,12 @@ def _learning(
     note(axes, _RIGHT, high, _automata(target, "T"), **muted)
     episodes = thousands(spec.learning.source_episodes)
     note(axes, _LEFT, low, f"Q-learning on extended states\n{episodes} episodes", **muted)
-    note(axes, _RIGHT, low, _outcome(results, transferable=transferable), edge=INK, face=PAPER)
+    note(axes, _RIGHT, low, _outcome(results, spec, transferable=transferable), edge=INK, face=PAPER)
     for x in (_LEFT, _RIGHT):
         arrow(
             axes,
             (x, high - 0.37),
-            (x, low + (0.37 if x == _LEFT else 0.56)),
+            (x, low + (0.37 if x == _LEFT else 0.68)),
             colour=ink,
             dashed=not transferable,
         )
@@ -176,16 +176,16 @@ def _automata(formula: NamedFormula | None, task: str) -> str:
     return f"{title}\n{locations} locations, {clocks} clock{'s' if clocks > 1 else ''}"
 
 
-def _outcome(results: Mapping[str, Any], *, transferable: bool) -> str:
-    """What learning in the target task gave, by the first block at the optimum."""
+def _outcome(results: Mapping[str, Any], spec: StudySpec, *, transferable: bool) -> str:
+    """What learning in the target task gave, by the study's goal."""
     methods = results["summary"]["methods"]
     names = [name for name in (("III", "IV") if transferable else ("I",)) if name in methods]
     title = "Q-learning on extended states" if transferable else "Q-learning on τ-states"
-    lines = [title, "episodes to the first block at V*:"]
+    lines = [title, "episodes to the", f"{spec.learning.goal.heading}:"]
     what = {"I": "Method I", "III": "without transfer", "IV": "with transfer"}
     for name in names:
         runs = methods[name]
-        found = runs["statistics"]["first_block"]
+        found = runs["statistics"]["goal"]
         if found["mean"] is not None:
             lines.append(f"{what[name]} {thousands(found['mean'])}")
         else:

@@ -1,0 +1,183 @@
+"""What a study is, as data: a source and a target task, and every setting of what is done with them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+from tickwise.envs.catalog import EnvironmentSpec
+from tickwise.inference.swarm import SwarmSettings
+from tickwise.inference.tree import InferenceSettings
+from tickwise.rl.qlearning import QSettings
+
+METHODS = ("I", "II", "III", "IV")
+"""The methods of Section V: τ-states; the formula without information gain; the formula; with transferred values."""
+
+
+@dataclass(frozen=True, slots=True)
+class Collection:
+    """The data collection phase (Section IV-A): the first episodes of Q-learning on τ-states.
+
+    Attributes:
+        episodes: Episodes of the phase.
+        tau: The horizon τ of the τ-states.
+        negatives: Trajectories with label -1 drawn at random from all those there are.
+        positives: Per task, collection goes on in steps of a tenth of the phase until so many have label 1; about as
+            many as the paper has.
+        most_episodes: It ends here in any case.
+        least_ticks: None gives label 1 to trajectories with a return above 0 (Case Study 1). A number gives it to those
+            that last at least so many ticks, and their last state is left out, since the rule may have been broken
+            there (Case Study 2).
+    """
+
+    episodes: int = 10_000
+    tau: int = 5
+    negatives: int = 200
+    positives: dict[str, int] = field(default_factory=lambda: {"source": 40, "target": 20})
+    most_episodes: int = 200_000
+    least_ticks: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """When training has got there, by the measure that is nearest to the paper's.
+
+    Attributes:
+        block: Episodes whose mean return counts, one block after the other.
+        above: What the mean return has to exceed; None where it has to be at least the optimal value V*.
+    """
+
+    block: int = 10
+    above: float | None = None
+
+    @property
+    def short(self) -> str:
+        """What it looks for, in a few words, to stand after "the first"."""
+        if self.above is not None and self.block == 1:
+            return f"episode with a return above {self.above:,.0f}"
+        level = "at the optimum" if self.above is None else f"above {self.above:,.0f}"
+        return f"block of {self.block} episodes {level}"
+
+    @property
+    def text(self) -> str:
+        """The measure in words."""
+        one = self.block == 1
+        what = "training episode whose return" if one else f"block of {self.block} training episodes whose mean return"
+        level = "is at least the optimal value V*" if self.above is None else f"exceeds {self.above:,.0f}"
+        return f"the first {what} {level}"
+
+    @property
+    def heading(self) -> str:
+        """The head of a column."""
+        what = "return" if self.block == 1 else "block"
+        return f"first {what} " + ("at V*" if self.above is None else f"above {self.above:,.0f}")
+
+
+@dataclass(frozen=True, slots=True)
+class Learning:
+    """How the methods learn and how they are measured.
+
+    Attributes:
+        settings: Settings of Q-learning, the same for every method.
+        source: Settings of Q-learning in the source task, for the Q-function that is transferred.
+        source_episodes: Episodes of learning in the source task before its Q-function is transferred.
+        most_episodes: Method to the most episodes it learns for.
+        disjunct: The name of the strategy that chooses the disjunct at the start of an episode (see
+            `tickwise.rl.states.DISJUNCT_CHOICES`).
+        goal: The measure of convergence nearest to the paper's.
+        window: Episodes of the paper's box plot: the mean return over them is compared.
+        block: Episodes of the paper's averaging.
+        evaluation_episodes: Episodes of each evaluation of the greedy policy, on fixed seeds.
+        evaluation_steps: Pairs (until, every): up to episode ``until`` there is an evaluation at each multiple of
+            ``every``; the last pair has no end.
+    """
+
+    settings: QSettings = field(default_factory=lambda: QSettings(initial=40.0))
+    source: QSettings = field(default_factory=lambda: QSettings(initial=40.0))
+    source_episodes: int = 1_000_000
+    most_episodes: dict[str, int] = field(
+        default_factory=lambda: {"I": 2_000_000, "II": 2_000_000, "III": 100_000, "IV": 100_000}
+    )
+    disjunct: str = "nearest_centroid"
+    goal: Goal = field(default_factory=Goal)
+    window: int = 40_000
+    block: int = 10
+    evaluation_episodes: int = 200
+    evaluation_steps: tuple[tuple[int, int], ...] = ((10_000, 100), (50_000, 500), (0, 5_000))
+
+    @property
+    def shown(self) -> int:
+        """Episodes of the training curves: a quarter more than the window."""
+        return self.window * 5 // 4
+
+
+@dataclass(frozen=True, slots=True)
+class Published:
+    """What the paper reports of a study, for comparison; nothing of a study that is not the paper's.
+
+    Attributes:
+        formulas: ``source``, ``target`` and ``target_without_information``, as text.
+        positives: Trajectories with label 1 of the source and the target.
+        episodes: Episodes until each method gets to the goal, None where it does not within two million.
+        collection: Episodes of the data collection phase.
+        regions: What the paper says of the true regions.
+        figures: The paper's counterparts of the figures ``maps`` and ``curves``.
+        settled: Episodes of each method "for convergence to the optimal policy", where the goal is another measure.
+    """
+
+    formulas: dict[str, str] = field(default_factory=dict)
+    positives: dict[str, int] = field(default_factory=dict)
+    episodes: dict[str, int | None] = field(default_factory=dict)
+    collection: int | None = None
+    regions: str = ""
+    figures: dict[str, str] = field(default_factory=dict)
+    settled: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class StudySpec:
+    """A study: a source and a target task, and all settings.
+
+    Attributes:
+        name: The name on the command line.
+        title: The title of the report.
+        source: The source environment with its hidden task.
+        target: The target environment with its hidden task.
+        collection: The data collection phase.
+        inference: The constraints of Problem 1 and the settings of Algorithm 1.
+        swarm: The settings of the particle swarm.
+        learning: Learning and evaluation.
+        reference: A formula with the structure that the source task has.
+        published: What the paper reports of it.
+        similar: Whether the target task is known to be similar to the source task.
+        remarks: What else the study's author chose: what it is about, what the paper says of it, and the choice.
+        runs: Independent runs.
+        seed: The root seed.
+        short: Whether it was cut short to be looked at within minutes.
+    """
+
+    name: str
+    title: str
+    source: EnvironmentSpec
+    target: EnvironmentSpec
+    collection: Collection
+    inference: InferenceSettings
+    swarm: SwarmSettings
+    learning: Learning
+    reference: str
+    published: Published = field(default_factory=Published)
+    similar: bool = True
+    remarks: tuple[tuple[str, str, str], ...] = ()
+    runs: int = 10
+    seed: int = 0
+    short: bool = False
+
+    def as_dict(self) -> dict[str, Any]:
+        """The specification as plain data, as it goes into a run folder and a report."""
+        return asdict(self)
+
+    def quick(self) -> StudySpec:
+        """The same study with fewer runs and episodes, to look at within minutes."""
+        limits = {"I": 100_000, "II": 100_000, "III": 50_000, "IV": 50_000}
+        most = {method: min(most, limits[method]) for method, most in self.learning.most_episodes.items()}
+        return replace(self, runs=3, short=True, learning=replace(self.learning, most_episodes=most))
