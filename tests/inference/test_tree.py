@@ -1,8 +1,12 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from tests.inference.worlds import errand_data, grid_prior
+from tests.inference.worlds import errand_data, grid_prior, ragged_walks, verdicts, weakly
+from tests.strategies import sdnfs
 from tickwise.errors import ConfigurationError, DataError
+from tickwise.inference.information import information_gain
 from tickwise.inference.objective import Objective
 from tickwise.inference.prior import BoxPrior
 from tickwise.inference.space import SearchSpace, shape_of
@@ -17,7 +21,8 @@ from tickwise.inference.tree import (
     is_satisfying,
 )
 from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import Operator, to_sdnf
+from tickwise.logic.sdnf import SDNF, Operator, SequentialConjunction, to_sdnf
+from tickwise.logic.syntax import Verdict
 
 FAST = SwarmSettings(particles=30, iterations=40, restarts=2, stall=10)
 
@@ -169,6 +174,52 @@ def test_a_nested_structure_has_to_earn_its_additional_parameter():
     assert (plain.primitive.operator.nested, free.primitive.operator.nested) == (False, True)
     assert plain.rate == free.rate
     assert plain.objective < free.objective
+
+
+QUICK = SwarmSettings(particles=8, iterations=4, restarts=1, stall=2, climbers=1)
+
+
+@settings(max_examples=25)
+@given(
+    rule=st.none() | sdnfs(most=2, disjuncts=2, longest=3),
+    seed=st.integers(0, 2**32 - 1),
+    horizon=st.integers(5, 12),
+    class_weight=st.sampled_from((None, "balanced")),
+)
+def test_a_tree_of_ragged_trajectories_says_what_the_semantics_says(rule, seed, horizon, class_weight):
+    """Algorithm 1 line by line; effect windows may reach beyond the end of all trajectories, or not use their last."""
+    data = ragged_walks(seed, 3, 9, 30, rule)
+    chosen = InferenceSettings(rate=0.9, depth=3, class_weight=class_weight)
+    space, prior = SearchSpace.grid(3, horizon), grid_prior(3, 9)
+    tree = infer_tree(data, prior, space, chosen, QUICK, np.random.default_rng(seed))
+    undecided = np.zeros(len(data), dtype=bool)
+    reached = np.zeros(len(data), dtype=int)
+    waiting = [(tree, np.ones(len(data), dtype=bool))]
+    while waiting:
+        node, here = waiting.pop()
+        assert (node.positives, node.negatives) == tuple((data.labels[here] == label).sum() for label in (1, -1))
+        assert node.path_formula is None or node.path_formula.primitives[-1].end <= horizon
+        if node.leaf:
+            reached[here] = node.label
+            continue
+        alone = SDNF((SequentialConjunction((node.primitive,)),))
+        said = verdicts(alone, data)
+        undecided |= said == Verdict.UNKNOWN
+        part = data.select(here)
+        assert all(node.primitive.end < p.start or p.end < node.primitive.start for p in node.path)  # Υ_z
+        if class_weight is None:
+            assert node.rate == pytest.approx(classification_rate(alone, part))
+        assert node.gain == pytest.approx(information_gain(alone, prior), abs=1e-12)
+        assert node.left.path == (*node.path, node.primitive)
+        assert node.right.path == (*node.path, node.primitive.negation)
+        waiting += [(node.left, here & (said != Verdict.FALSE)), (node.right, here & (said == Verdict.FALSE))]
+    if tree.formula is None:
+        assert (reached == -1).all()
+        return
+    satisfied = weakly(tree.formula, data)
+    assert satisfied[reached == 1].all()
+    # what ends before a primitive is decided is on both sides of it; nothing else is
+    assert (satisfied == (reached == 1))[~undecided].all()
 
 
 def test_equal_seeds_give_equal_trees():

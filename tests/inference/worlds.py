@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from tickwise.inference.prior import PathPrior
 from tickwise.inference.trajectories import LabelledTrajectories
+from tickwise.logic.sdnf import SDNF
+from tickwise.logic.syntax import Verdict
 
 STEPS = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])  # east, north, west, south
 Region = tuple[int, int, int, int]
@@ -97,3 +99,31 @@ def errand_data(
         if not does_errand(cells, first, stay, second):
             bad.append(cells)
     return LabelledTrajectories.from_arrays(np.array(good + bad) + 0.5, [1] * positives + [-1] * negatives, ("x", "y"))
+
+
+def cut_short(data: LabelledTrajectories, rng: np.random.Generator, shortest: int = 1) -> LabelledTrajectories:
+    """The same trajectories, each ended at a random tick."""
+    lengths = rng.integers(shortest, data.lengths + 1)
+    return LabelledTrajectories(data.values, lengths, data.labels, data.variables, data.ids)
+
+
+def ragged_walks(seed: int, size: int, horizon: int, count: int, rule: SDNF | None = None) -> LabelledTrajectories:
+    """Walks that end at any tick, labelled by a rule's weak verdict, or in turn where it says the same of nearly all."""
+    rng = np.random.default_rng(seed)
+    walks = np.array([walk(rng, size, horizon) for _ in range(count)]) + 0.5
+    labels = np.resize([1, -1], count)
+    data = cut_short(LabelledTrajectories.from_arrays(walks, labels, ("x", "y")), rng)
+    if rule is not None:
+        said = np.where(weakly(rule, data), 1, -1)
+        labels = said if abs(said.sum()) < 0.7 * count else labels
+    return LabelledTrajectories(data.values, data.lengths, labels, data.variables, data.ids)
+
+
+def weakly(rule: SDNF, data: LabelledTrajectories) -> NDArray[np.bool_]:
+    """Whether the reference semantics' verdict on each trajectory is not FALSE."""
+    return np.asarray(verdicts(rule, data)) != Verdict.FALSE
+
+
+def verdicts(rule: SDNF, data: LabelledTrajectories) -> NDArray[np.int8]:
+    """The three-valued verdict of the reference semantics on each trajectory."""
+    return np.asarray(rule.formula.verdict(data.values, variables=data.variables, lengths=data.lengths))
