@@ -1,18 +1,22 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from tests.inference.worlds import errand_data, grid_prior
+from tests.inference.worlds import errand_data, grid_prior, ragged_walks, weakly
+from tests.strategies import sdnfs
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.inference.information import information_gain
 from tickwise.inference.prior import BoxPrior
-from tickwise.inference.space import SearchSpace
+from tickwise.inference.space import SearchSpace, shape_of
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.template import fit_structure, fit_transferable
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.inference.tree import InferenceSettings, classification_rate, infer_tree
+from tickwise.inference.tree import InferenceSettings, classification_rate, infer_tree, is_satisfying
 from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.sdnf import SDNF, Operator, Primitive, SequentialConjunction, to_sdnf
 from tickwise.logic.structure import structurally_equivalent, structurally_transferable
+from tickwise.logic.syntax import Box, Interval, Not
 
 FAST = SwarmSettings(particles=30, iterations=40, restarts=1, stall=10)
 G, Y = (1, 2, 1, 3), (4, 5, 3, 5)
@@ -49,6 +53,86 @@ def test_a_joint_fit_finds_the_rule(errands):
     tree = infer_tree(errands, PRIOR, SPACE, InferenceSettings(), FAST, rng())
     assert fit.rate >= classification_rate(tree.formula, errands) - 0.02
     assert reach.start > stay.end
+
+
+QUICK = SwarmSettings(particles=8, iterations=3, restarts=1, stall=2, climbers=1)
+structures = st.lists(
+    st.lists(st.tuples(st.sampled_from(Operator), st.booleans()), min_size=1, max_size=3), min_size=1, max_size=3
+).filter(lambda pairs: sum(map(len, pairs)) <= 4)
+
+
+def any_formula(pairs):
+    """A formula of a structure that is given as (operator, complemented) pairs, with numbers that do not matter."""
+    disjuncts = []
+    for pair in pairs:
+        primitives, box = [], Box.of(x=(0, 1))
+        for tick, (operator, complemented) in enumerate(pair):
+            window, predicate = Interval(20 * tick, 20 * tick + 1), Not(box) if complemented else box
+            primitives.append(Primitive(operator, window, int(operator.nested), predicate))
+        disjuncts.append(SequentialConjunction(tuple(primitives)))
+    return SDNF(tuple(disjuncts))
+
+
+@settings(max_examples=25)
+@given(
+    pairs=structures,
+    rule=st.none() | sdnfs(most=2, longest=3),
+    seed=st.integers(0, 2**32 - 1),
+    ticks=st.integers(9, 12),
+)
+def test_a_joint_fit_of_ragged_trajectories_is_valid_and_reports_what_the_semantics_says(pairs, rule, seed, ticks):
+    """Any operators, negated ones too, in conjunctions of up to three and disjunctions of up to three."""
+    data, space, prior = ragged_walks(seed, 3, 9, 30, rule), SearchSpace.grid(3, ticks), grid_prior(3, 9)
+    chosen = InferenceSettings(rate=0.8, size=3)
+    fit = fit_structure(data, prior, space, any_formula(pairs), chosen, QUICK, np.random.default_rng(seed))
+    found = [[(p.operator, p.complemented) for p in disjunct.primitives] for disjunct in fit.formula.disjuncts]
+    assert found == pairs
+    for disjunct in fit.formula.disjuncts:  # which is sequential, or would not be there
+        assert disjunct.primitives[-1].end <= ticks
+        assert all(p.window.start < p.window.end for p in disjunct.primitives)
+        sides = [side for p in disjunct.primitives for bound in p.box.bounds for side in (bound.lower, bound.upper)]
+        assert set(sides) <= {0, 1, 2, 3}
+    assert fit.rate == (weakly(fit.formula, data) == (data.labels == 1)).mean()
+    assert fit.gain == pytest.approx(information_gain(fit.formula, prior), abs=1e-12)
+    assert fit.objective == pytest.approx(fit.rate + 0.01 * fit.gain)
+    assert fit.satisfying == is_satisfying(fit.formula, data, chosen) == (fit.rate >= 0.8 and fit.size <= 3)
+
+
+@settings(max_examples=15)
+@given(pairs=structures, seed=st.integers(0, 2**32 - 1))
+def test_a_fit_is_no_worse_than_where_it_starts(pairs, seed):
+    data, space, prior = ragged_walks(seed, 3, 9, 20), SearchSpace.grid(3, 9), grid_prior(3, 9)
+    structure, chosen = any_formula(pairs), InferenceSettings()
+    shape = shape_of(pairs)
+    start = space.decode(np.random.default_rng(seed).uniform(*space.bounds(shape)), shape)
+    gain = information_gain(start, prior)
+    fit = fit_structure(data, prior, space, structure, chosen, QUICK, np.random.default_rng(seed), start=start)
+    assert fit.objective >= classification_rate(start, data) + chosen.information_weight * gain - 1e-12
+
+
+@settings(max_examples=10)
+@given(pairs=structures.filter(lambda pairs: len(pairs) < 3), size=st.integers(1, 5), seed=st.integers(0, 2**32 - 1))
+def test_copies_grow_until_the_size_constraint_and_the_reason_says_so(pairs, size, seed):
+    """Labels in turn have no rule of the rate of 1 that is asked for, or one that the last copy found."""
+    data, prior = ragged_walks(seed, 3, 9, 30), grid_prior(3, 9)
+    source, chosen = any_formula(pairs), InferenceSettings(rate=1.0, size=size, information_weight=0.0)
+    result = fit_transferable(data, prior, SearchSpace.grid(3, 9), source, chosen, QUICK, np.random.default_rng(seed))
+    assert [attempt.size for attempt in result.attempts] == [
+        source.size * copies for copies in range(1, len(result.attempts) + 1)
+    ]
+    for attempt in result.attempts:
+        assert structurally_transferable(attempt.formula, source)
+        polarities = [p.complemented for disjunct in attempt.formula.disjuncts for p in disjunct.primitives]
+        assert polarities == [flag for pair in pairs for _, flag in pair] * (attempt.size // source.size)
+    assert [attempt.satisfying for attempt in result.attempts[:-1]] == [False] * (len(result.attempts) - 1)
+    if result.transferable:
+        assert result.attempts[-1].rate == 1
+    elif source.size > size:
+        assert result.attempts == ()
+        assert f"size {source.size}, more than the {size}" in result.reason
+    else:
+        assert len(result.attempts) == size // source.size
+        assert f"one more copy would exceed size {size}" in result.reason
 
 
 def two_places(seed):
@@ -104,12 +188,12 @@ def test_a_source_that_is_too_large_is_refused_at_once():
 
 
 def test_structures_that_do_not_fit(errands):
-    settings = InferenceSettings()
+    chosen = InferenceSettings()
     with pytest.raises(ConfigurationError, match="do not fit into 3 ticks"):
-        fit_structure(errands, PRIOR, SearchSpace.grid(5, 3), (("FG", "FG"),), settings, FAST, rng())
+        fit_structure(errands, PRIOR, SearchSpace.grid(5, 3), (("FG", "FG"),), chosen, FAST, rng())
     with pytest.raises(ConfigurationError, match="unknown operator"):
-        fit_structure(errands, PRIOR, SPACE, (("U",),), settings, FAST, rng())
+        fit_structure(errands, PRIOR, SPACE, (("U",),), chosen, FAST, rng())
     with pytest.raises(ConfigurationError, match="no primitive"):
-        fit_structure(errands, PRIOR, SPACE, ((),), settings, FAST, rng())
+        fit_structure(errands, PRIOR, SPACE, ((),), chosen, FAST, rng())
     with pytest.raises(DataError, match="no trajectory has label -1"):
-        fit_structure(errands.select(errands.labels == 1), PRIOR, SPACE, (("F",),), settings, FAST, rng())
+        fit_structure(errands.select(errands.labels == 1), PRIOR, SPACE, (("F",),), chosen, FAST, rng())

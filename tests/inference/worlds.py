@@ -108,7 +108,7 @@ def cut_short(data: LabelledTrajectories, rng: np.random.Generator, shortest: in
 
 
 def ragged_walks(seed: int, size: int, horizon: int, count: int, rule: SDNF | None = None) -> LabelledTrajectories:
-    """Walks that end at any tick, labelled by a rule's weak verdict, or in turn where it says the same of nearly all."""
+    """Walks that end at any tick, labelled by a rule, or in turn where it says the same of nearly all of them."""
     rng = np.random.default_rng(seed)
     walks = np.array([walk(rng, size, horizon) for _ in range(count)]) + 0.5
     labels = np.resize([1, -1], count)
