@@ -73,6 +73,17 @@ def test_a_primitive_and_its_negation_share_what_is_undecided_only(primitive, dr
         assert either == pytest.approx(2)
 
 
+@pytest.mark.parametrize("operator", ["F[2,20]", "G[3,5] !", "F[2,20] G[0,3]", "G[0,20] F[0,4]"])
+def test_many_disjuncts_of_long_windows(operator):
+    """Nine copies over two different places: far more joint clock valuations than are ever in use."""
+    places = [f"({x} <= x <= {x + 1})" for x in (0, 2)]
+    street = PathPrior(np.tri(4, k=1) - np.tri(4, k=-2), [[0.5], [1.5], [2.5], [3.5]], ("x",), 24)
+    few, many = (
+        to_sdnf(parse(" | ".join(f"({operator} {places[copy % 2]})" for copy in range(copies)))) for copies in (2, 9)
+    )
+    assert fast(many, street, ("x",)) == pytest.approx(probability(few, street), **TOLERANCE)
+
+
 def test_probabilities_by_hand():
     # two states, all steps possible: every path of 3 states has probability 1/8
     prior = PathPrior(np.ones((2, 2)), [[0.5], [1.5]], ("x",), 2)

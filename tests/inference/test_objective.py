@@ -60,8 +60,9 @@ def test_wrong_class_weights(class_weight):
         trajectory_weights(DATA.labels, class_weight)
 
 
-def test_too_many_clock_valuations_are_refused():
-    shape = shape_of([[STRUCTURES[2]]] * 8)
+@pytest.mark.parametrize(("pair", "disjuncts"), [(STRUCTURES[2], 12), (STRUCTURES[0], 13)])
+def test_too_many_clock_valuations_are_refused(pair, disjuncts):
+    shape = shape_of([[pair]] * disjuncts)
     space = SearchSpace.grid(4, 40)
-    with pytest.raises(ConfigurationError, match="8 disjuncts over 40 ticks"):
+    with pytest.raises(ConfigurationError, match=f"{disjuncts} disjuncts over 40 ticks"):
         Objective(DATA, np.ones(len(DATA)), PRIORS[0], space, shape, space.gaps(), 0.01)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tickwise._jit import njit
 from tickwise.inference.kernels import EVENTUALLY, EVENTUALLY_ALWAYS, PriorArrays, Shape, inside
+from tickwise.inference.numbering import place, roomier
 
 _ADVANCE, _FAIL = -1, -2
 
@@ -201,13 +202,10 @@ def log_probability(
     if start > prior.horizon:
         return 0.0
     codes = _codes(shape, times)
-    disjuncts, total = len(codes[0]), 1
-    for size in codes[0]:
-        total *= size
+    disjuncts = len(codes[0])
     letters = _letters(prior, shape, lower, upper)
     states = letters.shape[1]
     draws = _assignments(prior, shape, lower, upper) if prior.independent else prior.forward[start]
-    slot_of = np.full(total, -1, dtype=np.int64)
     # row k of `mass` is the mass of product code carried[k] before a letter, row k of `moved` that of fresh[k] after
     # it; both are zero outside the row's range (first state, one past the last state)
     carried, fresh = np.zeros(1, dtype=np.int64), np.zeros(8, dtype=np.int64)
@@ -216,6 +214,8 @@ def log_probability(
     mass[0], mass_range[0, 1] = draws, states
     after, reads = np.empty((disjuncts, 2), dtype=np.int64), np.empty(disjuncts, dtype=np.int64)
     outcomes, spans = np.empty(2**disjuncts, dtype=np.int64), np.empty((2**disjuncts, 2), dtype=np.int64)
+    # which row of `moved` has which code: a table with room to spare, since of all codes few carry mass
+    keys, rows = np.full(64, -1, dtype=np.int64), np.empty(64, dtype=np.int64)
     factor, accepted_log = 0.0, -np.inf
     # local names: a tuple of arrays handed to a function in a loop costs more than the loop
     independent, scale = prior.independent, prior.scale
@@ -229,16 +229,19 @@ def log_probability(
                 fresh = np.concatenate((fresh, np.zeros(more, dtype=np.int64)))
                 moved = np.concatenate((moved, np.zeros((more, states))))
                 moved_range = np.concatenate((moved_range, np.zeros((more, 2), dtype=np.int64)))
+                if len(keys) < 2 * len(moved):
+                    keys, rows = roomier(len(moved), fresh[:used])
             _successors(shape, times, tick, carried[k], codes, after, reads)
             for bits in range(len(outcomes)):
                 slot = _outcome(codes[0], after, bits)
                 if slot >= 0:
-                    if slot_of[slot] < 0:
-                        slot_of[slot] = used
+                    at = place(keys, slot)
+                    if keys[at] < 0:
+                        keys[at], rows[at] = slot, used
                         fresh[used] = slot
                         moved_range[used, 0], moved_range[used, 1] = states, 0
                         used += 1
-                    slot = slot_of[slot]
+                    slot = rows[at]
                 outcomes[bits] = slot
             gone, most = _read(mass[k], mass_range[k], letters, reads, outcomes, spans, moved, later[tick % len(later)])
             accepted += gone
@@ -248,7 +251,8 @@ def log_probability(
                 if slot >= 0:
                     moved_range[slot, 0] = min(moved_range[slot, 0], spans[bits, 0])
                     moved_range[slot, 1] = max(moved_range[slot, 1], spans[bits, 1])
-        used = _drop_empty(used, fresh, moved, moved_range, slot_of)
+        keys[:] = -1
+        used = _drop_empty(used, fresh, moved, moved_range)
         if tick == prior.horizon:  # what is still undecided counts as satisfied
             accepted += moved[:used].sum()
         if accepted > 0.0:
@@ -319,12 +323,10 @@ def _drop_empty(
     fresh: NDArray[np.int64],
     moved: NDArray[np.float64],
     moved_range: NDArray[np.int64],
-    slot_of: NDArray[np.int64],
 ) -> int:
-    """Keep the rows that got mass, in order, and forget the slots; returns how many rows stay."""
+    """Keep the rows that got mass, in order; returns how many rows stay."""
     kept = 0
     for k in range(used):
-        slot_of[fresh[k]] = -1
         if moved_range[k, 0] >= moved_range[k, 1]:
             continue
         if kept < k:

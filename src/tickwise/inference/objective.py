@@ -26,7 +26,8 @@ from tickwise.logic.sdnf import SDNF
 
 ClassWeight = str | Mapping[int, float] | None
 
-_LARGEST_PRODUCT = 50_000_000
+_MOST_DISJUNCTS = 12  # a tick of the exact probability looks at all combinations of their letters
+_LARGEST_PRODUCT = 2**62  # their joint clock valuations are numbered
 _REMEMBERED = 1 << 14  # rows of the memory of probabilities; a converging swarm asks for the same ones again
 
 
@@ -95,10 +96,11 @@ class Objective:
         product = 1
         for low, high in zip(self.shape.starts[:-1], self.shape.starts[1:], strict=True):
             nested = int(np.count_nonzero(self.shape.operators[low:high] >= EVENTUALLY_ALWAYS))
-            product *= self.space.horizon * max(nested, 1) + int(high - low) + 1
-        if product > _LARGEST_PRODUCT:
+            product *= self.space.horizon * nested + int(high - low) + 1
+        disjuncts = len(self.shape.starts) - 1
+        if disjuncts > _MOST_DISJUNCTS or product > _LARGEST_PRODUCT:
             raise ConfigurationError(
-                f"{len(self.shape.starts) - 1} disjuncts over {self.space.horizon} ticks make {product:.0e} clock "
+                f"{disjuncts} disjuncts over {self.space.horizon} ticks make {product:.0e} clock "
                 "valuations; use a smaller size or a shorter horizon"
             )
         data = self.data
