@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError, DataError, MissingFileError, StoreError
 from tickwise.experiments import jobs
 from tickwise.experiments.jobs import (
+    STEPS,
     Job,
     evaluation_points,
     labelled_data,
@@ -230,3 +232,27 @@ def test_a_study_that_fails_says_why(tmp_path: Path):
     assert found["target"]["formula"] is None
     assert "violates a constraint of Problem 1" in found["target"]["reason"]
     assert found["target_without_information"] is None
+
+
+def test_the_cost_of_an_inference_has_its_steps(finished: Path, tmp_path: Path):
+    cost = open_store(finished).load("cost-infer-0")["step_seconds"]
+    assert tuple(cost) == STEPS
+    assert all(seconds > 0 for seconds in cost.values())
+    folder = shutil.copytree(finished, tmp_path / "run")
+    (folder / "artefacts" / "infer-0.json").unlink()
+    store = Store(folder)
+    perform(Job("infer", "", 0), with_learning(most_episodes={}), store, silent)
+    assert tuple(store.load("cost-infer-0")["step_seconds"]) == STEPS[:2]
+    assert store.load("infer-0")["target_without_information"] is None  # nobody would learn with it
+    for part in ("source", "target"):
+        assert store.load("infer-0")[part] == open_store(finished).load("infer-0")[part]
+
+
+def test_an_inference_that_ends_at_step_1_costs_no_more(tmp_path: Path):
+    store = open_store(tmp_path, HOPELESS)
+    for task in ("source", "target"):
+        perform(Job("collect", task, 0), HOPELESS, store, silent)
+    told: list[tuple[int, ...]] = []
+    perform(Job("infer", "", 0), HOPELESS, store, lambda *step: told.append(step))
+    assert tuple(store.load("cost-infer-0")["step_seconds"]) == STEPS[:1]
+    assert told == [(0, 3), (1, 3)]

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -38,16 +40,18 @@ def task(rng: np.random.Generator, rule: str, n: int = 60, wanted: int = 25) -> 
     return Task(data, BoxPrior({"x": (0.0, 10.0)}, TICKS), SearchSpace.grid(10, TICKS, ("x",)))
 
 
-def outcome(source: Task, target: Task, settings: InferenceSettings):
+def outcome(source: Task, target: Task, settings: InferenceSettings, done: Callable[[int], None] | None = None):
     rngs = np.random.default_rng(1), np.random.default_rng(2)
-    return transfer_structure(source, target, settings, SWARM, *rngs)
+    return transfer_structure(source, target, settings, SWARM, *rngs, done)
 
 
 def test_similar_tasks_are_identified_as_transferable():
     rng = np.random.default_rng(0)
     settings = InferenceSettings(size=2, depth=1)
-    found = outcome(task(rng, "F[1,10] (7 <= x <= 8)"), task(rng, "F[2,11] (1 <= x <= 2)"), settings)
+    steps: list[int] = []
+    found = outcome(task(rng, "F[1,10] (7 <= x <= 8)"), task(rng, "F[2,11] (1 <= x <= 2)"), settings, steps.append)
     assert found.transferable, found.reason
+    assert steps == [1, 2]
     source, target = require_transferable(found)
     assert structurally_transferable(target, source)
     assert found.source_satisfying
@@ -73,9 +77,11 @@ def test_a_source_without_a_satisfying_formula_ends_at_step_1():
     noise = task(rng, "F[1,10] (7 <= x <= 8)")
     labels = rng.permuted(noise.data.labels)
     data = LabelledTrajectories(noise.data.values, noise.data.lengths, labels, noise.data.variables, noise.data.ids)
-    found = outcome(Task(data, noise.prior, noise.space), noise, InferenceSettings(depth=1, rate=0.99))
+    steps: list[int] = []
+    found = outcome(Task(data, noise.prior, noise.space), noise, InferenceSettings(depth=1, rate=0.99), steps.append)
     assert not found.transferable
     assert found.fit is None
+    assert steps == [1]
     assert "source" in found.reason
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,6 +73,7 @@ def transfer_structure(
     swarm: SwarmSettings,
     source_rng: np.random.Generator,
     target_rng: np.random.Generator,
+    done: Callable[[int], None] | None = None,
 ) -> Hypothesis:
     """Infer φ^S by Algorithm 1 (Step 1), then fit a structurally transferable φ^T (Step 2).
 
@@ -83,6 +84,7 @@ def transfer_structure(
         swarm: The settings of the particle swarm.
         source_rng: Draws of Step 1.
         target_rng: Draws of Step 2.
+        done: Told the number of each step, 1 or 2, when it is done; for who shows progress or measures time.
 
     Returns:
         What was inferred, and whether logical transferability is identified.
@@ -90,9 +92,13 @@ def transfer_structure(
     tree = infer_tree(source.data, source.prior, source.space, settings, swarm, source_rng)
     formula = tree.formula
     satisfying = formula is not None and is_satisfying(formula, source.data, settings)
+    if done is not None:
+        done(1)
     fit = None
     if formula is not None and satisfying:
         fit = fit_transferable(target.data, target.prior, target.space, formula, settings, swarm, target_rng)
+        if done is not None:
+            done(2)
     return Hypothesis(tree, formula, satisfying, fit)
 
 
