@@ -14,29 +14,30 @@ from tickwise.inference.prior import BoxPrior
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.inference.tree import InferenceSettings
+from tickwise.inference.tree import InferenceSettings, classification_rate
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.logic.structure import structurally_transferable
+from tickwise.logic.syntax import Verdict
 from tickwise.transfer.hypothesis import Task, require_transferable, tick_tables, transfer_structure
 
 TICKS = 12
 SWARM = SwarmSettings(particles=30, iterations=40, restarts=1)
 
 
-def task(rng: np.random.Generator, rule: str, n: int = 60, wanted: int = 25) -> Task:
-    """Random walks on a line of ten cells, labelled by a rule; at least ``wanted`` of each label."""
+def task(rng: np.random.Generator, rule: str, n: int = 60, wanted: int = 25, shortest: int = TICKS + 1) -> Task:
+    """Random walks on a line of ten cells, some cut short, labelled by a rule's weak view; ``wanted`` of each label."""
     phi = parse(rule)
     found: dict[int, list[np.ndarray]] = {1: [], -1: []}
     while min(map(len, found.values())) < wanted:
         steps = rng.integers(-2, 3, size=(n, TICKS))
         start = rng.integers(0, 10, size=(n, 1))
         walks = np.clip(np.concatenate([start, start + np.cumsum(steps, axis=1)], axis=1), 0, 9) + 0.5
-        for walk, verdict in zip(walks, np.atleast_1d(phi.verdict(walks[..., None])), strict=True):
-            found[int(verdict)].append(walk[:, None])
+        for walk, length in zip(walks[..., None], rng.integers(shortest, TICKS + 2, size=n), strict=True):
+            found[-1 if phi.verdict(walk[:length]) is Verdict.FALSE else 1].append(walk[:length])
     X = [walk for label in (1, -1) for walk in found[label][:wanted]]
     y = [label for label in (1, -1) for _ in range(wanted)]
-    data = LabelledTrajectories.from_arrays(np.array(X), np.array(y), ("x",))
+    data = LabelledTrajectories.from_arrays(X, np.array(y), ("x",))
     return Task(data, BoxPrior({"x": (0.0, 10.0)}, TICKS), SearchSpace.grid(10, TICKS, ("x",)))
 
 
@@ -57,6 +58,23 @@ def test_similar_tasks_are_identified_as_transferable():
     assert found.source_satisfying
     assert found.fit is not None
     assert found.fit.attempts[-1].satisfying
+
+
+@pytest.mark.parametrize(
+    ("source", "target"),
+    [
+        ("F[1,8] G[0,2] (6 <= x <= 9)", "F[2,9] G[0,1] (1 <= x <= 3)"),
+        ("G[1,9] F[0,2] (4 <= x <= 9)", "G[0,8] F[0,3] (0 <= x <= 5)"),
+        ("!F[2,6] (4 <= x <= 6)", "!F[3,9] (0 <= x <= 1)"),
+    ],
+)
+def test_similar_tasks_whose_episodes_end_at_any_tick_are_transferable(source: str, target: str):
+    rng = np.random.default_rng(5)
+    tasks = [task(rng, rule, shortest=4) for rule in (source, target)]
+    found = outcome(*tasks, InferenceSettings(size=2, depth=1, rate=0.9))
+    assert found.transferable, found.reason
+    for formula, data in zip(require_transferable(found), (one.data for one in tasks), strict=True):
+        assert classification_rate(formula, data) >= 0.9
 
 
 def test_tasks_that_are_not_similar_are_refused_with_the_reason():
