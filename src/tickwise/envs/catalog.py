@@ -1,8 +1,9 @@
-"""The environments that come with Tickwise: the two case studies of the paper, source and target."""
+"""The environments that come with Tickwise: the two case studies of the paper, source and target, and random ones."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.tabulate import TabularMDP
@@ -82,7 +83,10 @@ CASE_STUDY_2_TARGET = EnvironmentSpec(
 CATALOG = {
     spec.name: spec for spec in (CASE_STUDY_1_SOURCE, CASE_STUDY_1_TARGET, CASE_STUDY_2_SOURCE, CASE_STUDY_2_TARGET)
 }
-"""All environments by name."""
+"""All environments with a name of their own."""
+
+RANDOM_TASK = "RandomTask"
+"""The name of every environment that `tickwise.envs.random_tasks.random_task` draws."""
 
 
 def find(name: str) -> EnvironmentSpec:
@@ -100,15 +104,15 @@ def register_all() -> None:
     """Register the environments with Gymnasium, where they are not registered yet.
 
     Each gets its plain id, which ``gymnasium.make("tickwise:CaseStudy1Source-v0")`` looks up, and the same
-    id in the namespace ``tickwise/``.
+    id in the namespace ``tickwise/``. ``gymnasium.make("tickwise:RandomTask-v0", task_seed=17)`` draws a task.
     """
     from gymnasium.envs.registration import register, registry
 
-    for spec in CATALOG.values():
-        for full_id in (spec.id, f"tickwise/{spec.id}"):
+    entries: list[tuple[str, str, dict[str, Any]]] = [
+        (spec.id, "GridWorldEnv", {"specification": spec.name}) for spec in CATALOG.values()
+    ]
+    entries.append((f"{RANDOM_TASK}-v0", "RandomTaskEnv", {}))
+    for plain_id, environment, settings in entries:
+        for full_id in (plain_id, f"tickwise/{plain_id}"):
             if full_id not in registry:
-                register(
-                    id=full_id,
-                    entry_point="tickwise.envs.environment:GridWorldEnv",
-                    kwargs={"specification": spec.name},
-                )
+                register(id=full_id, entry_point=f"tickwise.envs.environment:{environment}", kwargs=settings)

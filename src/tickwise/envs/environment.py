@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium
 import numpy as np
@@ -17,6 +17,9 @@ from tickwise.envs.rendering import Map, Scene, picture, text_map
 from tickwise.envs.tabulate import cumulative, draw
 from tickwise.envs.tasks import TaskMonitor
 from tickwise.errors import ConfigurationError
+
+if TYPE_CHECKING:  # it brings compiled kernels, which only random tasks need
+    from tickwise.envs.random_tasks import RandomTaskSettings, Structure
 
 
 class GridWorldEnv(gymnasium.Env[NDArray[np.int64], np.int64]):
@@ -218,3 +221,51 @@ class GridWorldEnv(gymnasium.Env[NDArray[np.int64], np.int64]):
         if self._ended:
             information["is_success"] = self._monitor.success
         return information
+
+
+class RandomTaskEnv(GridWorldEnv):
+    """A robot in a random square world, rewarded for a random temporal formula that it is not told.
+
+    ## Description
+    The world, the deadline and the formula are those of `tickwise.envs.random_tasks.random_task`: the task can
+    be achieved almost certainly by who knows it, and now and then by chance. In all else the environment is a
+    `GridWorldEnv`.
+
+    ```python
+    import gymnasium
+
+    env = gymnasium.make("tickwise:RandomTask-v0", task_seed=17)
+    print(env.unwrapped.specification.task.formula)
+    ```
+
+    ## Rewards
+    +100 if the formula is satisfied and -10 if it is violated: at the deadline, or, where the task's `early` is
+    set, at the first tick from 1 on at which that is certain. Nothing before.
+
+    ## Arguments
+    - `task_seed=0`: what the world and the task are drawn from, a whole number; the seed of `reset` is another.
+    - `structure=None`: the operators of the formula, see `random_task`; by default drawn.
+    - `settings=None`: the `RandomTaskSettings`; by default their defaults.
+    - `render_mode=None`: as for `GridWorldEnv`.
+
+    ## Version History
+    - v0: initial version.
+
+    Raises:
+        ConfigurationError: If an argument is out of range, or no task of the structure was found.
+    """
+
+    def __init__(
+        self,
+        task_seed: int = 0,
+        *,
+        structure: Structure | None = None,
+        settings: RandomTaskSettings | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        from tickwise.envs.random_tasks import random_task
+
+        if isinstance(task_seed, bool) or not isinstance(task_seed, (int, np.integer)) or task_seed < 0:
+            raise ConfigurationError(f"task_seed is {task_seed!r}; use a whole number of 0 or more")
+        specification = random_task(np.random.default_rng(task_seed), structure, settings=settings)
+        super().__init__(specification, render_mode=render_mode)

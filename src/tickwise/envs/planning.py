@@ -77,6 +77,27 @@ def _value(
 
 
 @njit
+def reachable(task_delta: NDArray[np.int32], task_letter: NDArray[np.int32], horizon: int) -> NDArray[np.bool_]:
+    """Which task states some sequence of the world's letters reaches at which tick.
+
+    A task that counts ticks reaches few of its states at any one tick, so skipping the others saves most work.
+
+    Returns:
+        Shape ``(horizon + 1, task states)``.
+    """
+    occurring = np.unique(task_letter)
+    reached = np.zeros((horizon + 1, len(task_delta)), dtype=np.bool_)
+    for letter in occurring:
+        reached[0, task_delta[0, letter]] = True
+    for t in range(horizon):
+        for w in range(len(task_delta)):
+            if reached[t, w]:
+                for letter in occurring:
+                    reached[t + 1, task_delta[w, letter]] = True
+    return reached
+
+
+@njit
 def backward_induction(
     successor: NDArray[np.int32],
     probability: NDArray[np.float64],
@@ -94,14 +115,18 @@ def backward_induction(
     task, see `tickwise.envs.tabulate.TabularMDP` and `tickwise.envs.tasks.TaskTable`.
 
     Returns:
-        Values with ``horizon`` ticks to go, shape ``(task states, states)``.
+        Values with ``horizon`` ticks to go, shape ``(task states, states)``; only those of task states that can
+        be reached at tick 0 mean something.
     """
     states, actions, outcomes = successor.shape
+    reached = reachable(task_delta, task_letter, horizon)
     values = np.zeros((len(task_delta), states))
-    arriving = np.empty_like(values)
+    arriving = np.zeros_like(values)
     for t in range(horizon, 0, -1):
         # the value of arriving at tick t in state s with the task in w: the reward there and what follows
         for w in range(len(task_delta)):
+            if not reached[t, w]:
+                continue
             for s in range(states):
                 value = np.float64(reward[w, s])
                 if t == horizon:
@@ -110,6 +135,8 @@ def backward_induction(
                     value += values[w, s]
                 arriving[w, s] = value
         for w in range(len(task_delta)):
+            if not reached[t - 1, w]:
+                continue
             for s in range(states):
                 best = -np.inf
                 for a in range(actions):
@@ -133,7 +160,7 @@ def random_success(
     success: NDArray[np.bool_],
     horizon: int,
 ) -> float:
-    """The probability of ending in success under uniformly random actions, by carrying it forward tick by tick.
+    """The probability of ending in success under uniformly random actions, carried forward tick by tick.
 
     The arguments are arrays of the world and the task, see `backward_induction`.
 
@@ -141,24 +168,29 @@ def random_success(
         The probability, from the distribution of the initial states.
     """
     states, actions, outcomes = successor.shape
+    reached = reachable(task_delta, task_letter, horizon)
     mass = np.zeros((len(task_delta), states))
     arriving = np.zeros_like(mass)
     for s in range(states):
         mass[task_delta[0, task_letter[s]], s] += initial[s]
     total = 0.0
     for t in range(1, horizon + 1):
-        arriving[:] = 0.0
         for w in range(len(task_delta)):
+            if reached[t, w]:
+                arriving[w] = 0.0
+        for w in range(len(task_delta)):
+            if not reached[t - 1, w]:
+                continue
             for s in range(states):
-                if mass[w, s] == 0.0:
-                    continue
                 share = mass[w, s] / actions
+                if share == 0.0:
+                    continue
                 for a in range(actions):
                     for k in range(outcomes):
                         after = successor[s, a, k]
                         arriving[task_delta[w, task_letter[after]], after] += share * probability[s, a, k]
         for w in range(len(task_delta)):
-            if not (terminated[w] or t == horizon):
+            if not (reached[t, w] and (terminated[w] or t == horizon)):
                 continue
             for s in range(states):
                 total += arriving[w, s] if success[w] else 0.0
