@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from tests.envs.twins import history_success, history_value, random_mdp, random_task
 from tickwise.envs.catalog import CASE_STUDY_1_SOURCE, CASE_STUDY_1_TARGET, CASE_STUDY_2_SOURCE
 from tickwise.envs.gridworld import GridWorld
-from tickwise.envs.planning import best_success_probability, optimal_value, success_probability, worst_value
+from tickwise.envs.planning import best_success_probability, optimal_value, reachable, success_probability, worst_value
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.envs.tasks import ReachStayReach, Recurrence, TaskTable
 from tickwise.logic.syntax import Box
@@ -40,6 +40,17 @@ def test_chances_of_success_equal_brute_force_over_histories(seed: int):
     mean = history_success(mdp, task, lambda chances: sum(chances) / len(chances))
     assert success_probability(mdp, task) == pytest.approx(mean, abs=1e-9)
     assert best_success_probability(mdp, task) == pytest.approx(history_success(mdp, task, max), abs=1e-9)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0, 2**32 - 1))
+def test_reachable_task_states_are_those_of_some_sequence_of_letters(seed: int):
+    _, task = small(seed)
+    states = {int(task.delta[0, letter]) for letter in task.letter}
+    found = reachable(task.delta, task.letter, task.horizon)
+    for row in found:
+        assert set(np.flatnonzero(row).tolist()) == states
+        states = {int(task.delta[state, letter]) for state in states for letter in task.letter}
 
 
 def test_one_step_by_hand():

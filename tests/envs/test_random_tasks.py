@@ -88,7 +88,7 @@ def test_a_task_is_within_all_bounds(seed: int, structure: Structure):
 
 
 @given(seeds)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_the_same_state_gives_the_same_task(seed: int):
     first, second = np.random.default_rng(seed), np.random.default_rng(seed)
     spec = random_task(first)
@@ -135,6 +135,9 @@ def test_what_cannot_be_found_is_said():
         random_task(np.random.default_rng(0), (((G, False),),), settings=impossible)
     with pytest.raises(ConfigurationError, match=r"no random task was found in 3 worlds"):
         random_task(np.random.default_rng(0), settings=dataclasses.replace(impossible, region=0.0))
+    short = RandomTaskSettings(deadlines=(1, 1), worlds=3)
+    with pytest.raises(ConfigurationError, match=r"structure F p & F p & F p was found in 3 worlds"):
+        random_task(np.random.default_rng(0), (((F, False),) * 3,), settings=short)
 
 
 @pytest.mark.parametrize("structure", [(), ((),), ((("U", False),),), (("F", False),), 3])

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import re
+import string
+
 import gymnasium
 import numpy as np
 import pytest
@@ -7,6 +10,7 @@ from gymnasium.error import ResetNeeded
 
 from tickwise.envs.catalog import CATALOG, register_all
 from tickwise.envs.environment import GridWorldEnv
+from tickwise.envs.rendering import _GLYPHS, Map, Scene, picture
 
 register_all()
 GREEN, YELLOW, SKY, WHITE = (0, 158, 115), (240, 228, 66), (86, 180, 233), (255, 255, 255)
@@ -148,3 +152,12 @@ def test_no_mode_draws_nothing_and_nothing_is_drawn_before_the_start():
     assert env.render() is None
     with pytest.raises(ResetNeeded, match="call reset"):
         GridWorldEnv("CaseStudy1Source", render_mode="ansi").render()
+
+
+def test_every_letter_and_digit_can_be_written_and_told_apart():
+    glyphs = [_GLYPHS[character] for character in string.ascii_uppercase + string.digits]
+    assert all(re.fullmatch(r"(?:[01]{3} ){4}[01]{3}", glyph) for glyph in glyphs)
+    # O and 0, I and 1 or S and 5 may look alike, but no two letters do
+    assert len(set(glyphs[:26])) == 26
+    image = picture(Map(2, ("A", "Z9", "M", ""), (WHITE,) * 4), Scene((1, 1, 0), 0, 5, "", None))
+    assert (tile(image, 2, 0, 1) == 0).any()

@@ -89,7 +89,7 @@ def twin(task: FormulaTask, states: list[int]) -> tuple[list[Step], bool]:
 
 
 @given(episodes())
-@settings(max_examples=600, deadline=None)
+@settings(max_examples=400, deadline=None)
 def test_the_table_agrees_with_the_three_valued_semantics(episode: tuple[FormulaTask, list[int]]):
     task, states = episode
     assert follow(task.table(MDP), states) == twin(task, states)

@@ -250,8 +250,10 @@ def _without_one(parts: Sequence[_Part]) -> list[tuple[_Part, ...]]:
 def _primitives(
     rng: np.random.Generator, kinds: Sequence[Kind], size: int, arena: _Arena
 ) -> tuple[Primitive, ...] | None:
-    """Random primitives with consecutive effect windows (Definition 5), or None where a duration does not fit."""
+    """Random primitives with consecutive effect windows (Definition 5), or None where they do not fit."""
     count = len(kinds)
+    if arena.deadline + 1 < count:
+        return None
     # sorted draws without repetition, moved together so that a window may be a single tick
     ticks = np.sort(rng.choice(arena.deadline + 1 + count, 2 * count, replace=False))
     starts = (ticks[::2] - np.arange(count)).tolist()
