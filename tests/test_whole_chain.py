@@ -84,7 +84,7 @@ def locations(memory: Memory) -> np.ndarray:
 @pytest.mark.parametrize("text", FORMULAS)
 def test_from_trajectories_to_a_transferred_q_function(text: str):
     phi, mdp = to_sdnf(parse(text)), GridWorld(SIZE).mdp()
-    task = FormulaTask(text, TICKS, early=True)
+    task = FormulaTask(text, TICKS, ends="decided")
     data = walks(mdp, phi)
     prior = PathPrior(mdp.support_graph(), mdp.coordinates, mdp.variables, TICKS)
     space, chosen = SearchSpace.grid(SIZE, TICKS), InferenceSettings(size=4, rate=0.9)

@@ -16,7 +16,7 @@ from tickwise.envs.planning import best_success_probability, success_probability
 from tickwise.envs.random_tasks import KINDS, Kind, RandomTaskSettings, Structure, random_task, structure_text
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.envs.tasks import inside
-from tickwise.envs.temporal import FormulaTask
+from tickwise.envs.temporal import ENDINGS, FormulaTask
 from tickwise.errors import ConfigurationError
 from tickwise.logic.sdnf import SDNF, Operator, Primitive, SequentialConjunction
 
@@ -108,16 +108,23 @@ def test_structures_worlds_and_ends_vary():
     assert {len(disjunct) for spec in specs for disjunct in kinds_of(spec.task)} == {1, 2}
     assert {kind for spec in specs for disjunct in kinds_of(spec.task) for kind in disjunct} == set(KINDS)
     assert {spec.world.size for spec in specs} == {5, 6, 7, 8}
-    assert {spec.task.early for spec in specs} == {False, True}
+    assert {spec.task.ends for spec in specs} == set(ENDINGS)
     assert len({spec.task.formula for spec in specs}) == 40
 
 
 def test_settings_are_kept():
-    chosen = RandomTaskSettings(sizes=(6, 6), deadlines=(25, 25), durations=(3, 3), early=1.0, chances=(0.01, 0.02))
+    chosen = RandomTaskSettings(
+        sizes=(6, 6), deadlines=(25, 25), durations=(3, 3), windows=(4, 5), disjoint=True, endings=("violated",),
+        chances=(0.01, 0.02),
+    )  # fmt: skip
     spec = random_task(np.random.default_rng(3), (((FG, False), (F, False)),), settings=chosen)
-    assert (spec.world.size, spec.task.deadline, spec.task.early) == (6, 25, True)
-    assert spec.task.sdnf.disjuncts[0].primitives[0].duration == 3
-    assert 0.01 <= success_probability(spec.mdp(), spec.task_table()) <= 0.02
+    assert (spec.world.size, spec.task.deadline, spec.task.ends) == (6, 25, "violated")
+    first, second = spec.task.sdnf.disjuncts[0].primitives
+    assert first.duration == 3
+    assert {primitive.window.end - primitive.window.start + 1 for primitive in (first, second)} <= {4, 5}
+    mdp = spec.mdp()
+    assert not (inside(first.box, mdp) & inside(second.box, mdp)).any()
+    assert 0.01 <= success_probability(mdp, spec.task_table()) <= 0.02
 
 
 def test_a_structure_may_be_plain_text():

@@ -17,7 +17,7 @@ from tickwise.envs.environment import GridWorldEnv
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.planning import best_success_probability, optimal_value, success_probability, worst_value
 from tickwise.envs.tasks import ReachStayReach
-from tickwise.envs.temporal import FormulaTask
+from tickwise.envs.temporal import ENDINGS, Ending, FormulaTask
 from tickwise.errors import ConfigurationError, FormulaError, ParseError, UnknownVariableError
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, Operator, Primitive, SequentialConjunction
@@ -72,7 +72,7 @@ def episodes(draw: st.DrawFn) -> tuple[FormulaTask, list[int]]:
     runs = draw(st.lists(st.tuples(st.sampled_from(pool), st.integers(1, 5)), min_size=1, max_size=20))
     states = [state for state, length in runs for _ in range(length)]
     states += [states[-1]] * deadline
-    return FormulaTask(str(formula), deadline, 7.0, -3.0, draw(st.booleans())), states[: deadline + 1]
+    return FormulaTask(str(formula), deadline, 7.0, -3.0, draw(st.sampled_from(list(ENDINGS)))), states[: deadline + 1]
 
 
 def twin(task: FormulaTask, states: list[int]) -> tuple[list[Step], bool]:
@@ -82,7 +82,7 @@ def twin(task: FormulaTask, states: list[int]) -> tuple[list[Step], bool]:
     for tick in range(1, task.deadline + 1):
         verdict = formula.verdict(MDP.coordinates[states[: tick + 1]], variables=MDP.variables)
         gained = task.reward if verdict > 0 else task.penalty
-        if tick == task.deadline or (task.early and verdict != 0):
+        if tick == task.deadline or verdict in ENDINGS[task.ends]:
             return [*steps, (gained, True)], verdict > 0
         steps.append((0.0, False))
     raise AssertionError("an episode has an end")
@@ -99,7 +99,7 @@ def test_the_table_agrees_with_the_three_valued_semantics(episode: tuple[Formula
 @settings(max_examples=60, deadline=None)
 def test_an_early_end_changes_no_chance_and_no_undiscounted_value(formula: Formula):
     task = FormulaTask(str(formula), max(1, formula.end_effect))
-    late, soon = task.table(MDP), dataclasses.replace(task, early=True).table(MDP)
+    late, soon = task.table(MDP), dataclasses.replace(task, ends="decided").table(MDP)
     for measure in (success_probability, best_success_probability, optimal_value, worst_value):
         assert measure(MDP, soon) == pytest.approx(measure(MDP, late), abs=1e-4)
 
@@ -107,7 +107,7 @@ def test_an_early_end_changes_no_chance_and_no_undiscounted_value(formula: Formu
 @given(formulas())
 @settings(max_examples=60, deadline=None)
 def test_a_task_state_is_reached_and_stays_once_decided(formula: Formula):
-    table = FormulaTask(str(formula), max(1, formula.end_effect), early=True).table(MDP)
+    table = FormulaTask(str(formula), max(1, formula.end_effect), ends="decided").table(MDP)
     reached = {0}
     frontier = [0]
     while frontier:
@@ -158,7 +158,7 @@ def test_a_table_by_hand():
 
 
 def test_what_tick_0_decides_is_paid_at_tick_1():
-    task = FormulaTask("F[0,0] (0 <= x <= 1 & 0 <= y <= 2)", 9, 5.0, -1.0, early=True)
+    task = FormulaTask("F[0,0] (0 <= x <= 1 & 0 <= y <= 2)", 9, 5.0, -1.0, ends="decided")
     inside, outside = WORLD.state(0, 0, 0), WORLD.state(2, 2, 0)
     assert follow(task.table(MDP), [inside, outside, outside]) == ([(5.0, True)], True)
     assert follow(task.table(MDP), [outside, inside, inside]) == ([(-1.0, True)], False)
@@ -166,8 +166,8 @@ def test_what_tick_0_decides_is_paid_at_tick_1():
 
 def test_a_complement_is_followed():
     """G[1,3] outside A, and F[1,3] A, are each other's negation, at every prefix."""
-    avoid = FormulaTask("G[1,3] !(0 <= x <= 1 & 0 <= y <= 2)", 3, 1.0, -1.0, early=True)
-    visit = FormulaTask("F[1,3] (0 <= x <= 1 & 0 <= y <= 2)", 3, -1.0, 1.0, early=True)
+    avoid = FormulaTask("G[1,3] !(0 <= x <= 1 & 0 <= y <= 2)", 3, 1.0, -1.0, ends="decided")
+    visit = FormulaTask("F[1,3] (0 <= x <= 1 & 0 <= y <= 2)", 3, -1.0, 1.0, ends="decided")
     inside, outside = WORLD.state(0, 0, 0), WORLD.state(2, 2, 0)
     for states in ([inside, outside, inside, outside], [inside, outside, outside, outside]):
         steps, success = follow(avoid.table(MDP), states)
@@ -204,14 +204,14 @@ def test_labels_go_beyond_the_alphabet():
     assert [mark.label for mark in FormulaTask(text, 40).landmarks][-3:] == ["Z", "A1", "B1"]
 
 
-@pytest.mark.parametrize("early", [False, True])
+@pytest.mark.parametrize("ends", list(ENDINGS))
 @pytest.mark.parametrize(
     "formula",
     [RULE, f"{RULE} | G[3,7] F[0,2] !(0 <= x <= 2) & F[10,11] (1 <= x <= 3 & 2 <= y <= 3)"],
     ids=["one", "two"],
 )
-def test_episodes_of_the_environment_equal_a_walk_on_the_arrays(formula: str, early: bool):
-    spec = EnvironmentSpec("Timed", WORLD, FormulaTask(formula, 13, early=early))
+def test_episodes_of_the_environment_equal_a_walk_on_the_arrays(formula: str, ends: Ending):
+    spec = EnvironmentSpec("Timed", WORLD, FormulaTask(formula, 13, ends=ends))
     mdp, table = spec.mdp(), spec.task_table()
     env = GridWorldEnv(spec)
     rng, chooser = np.random.default_rng(12), np.random.default_rng(34)
@@ -228,12 +228,12 @@ def test_episodes_of_the_environment_equal_a_walk_on_the_arrays(formula: str, ea
             assert (information["state"], reward, terminated, truncated) == (*following, False)
         verdict = parse(formula).verdict(mdp.coordinates[states], variables=mdp.variables)
         assert information["is_success"] == (verdict > 0)
-    assert (len(lengths) > 1) == early
+    assert (len(lengths) > 1) == (ends != "deadline")
 
 
 @pytest.mark.parametrize("render_mode", [None, "rgb_array", "ansi"])
 def test_gymnasiums_checker_is_content(render_mode: str | None):
-    env = GridWorldEnv(EnvironmentSpec("Timed", WORLD, FormulaTask(RULE, 9, early=True)), render_mode=render_mode)
+    env = GridWorldEnv(EnvironmentSpec("Timed", WORLD, FormulaTask(RULE, 9, ends="decided")), render_mode=render_mode)
     check_env(env, skip_render_check=True)
     if render_mode:
         env.reset(seed=0)

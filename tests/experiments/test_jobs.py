@@ -256,3 +256,14 @@ def test_an_inference_that_ends_at_step_1_costs_no_more(tmp_path: Path):
     perform(Job("infer", "", 0), HOPELESS, store, lambda *step: told.append(step))
     assert tuple(store.load("cost-infer-0")["step_seconds"]) == STEPS[:1]
     assert told == [(0, 3), (1, 3)]
+
+
+def test_noise_turns_the_labels_of_a_share_round(finished: Path):
+    store = open_store(finished)
+    clean = labelled_data(TINY, store, "source", 0)
+    spec = replace(TINY, collection=replace(TINY.collection, noise=0.25))
+    noisy = labelled_data(spec, store, "source", 0)
+    assert (noisy.labels != clean.labels).sum() == round(0.25 * len(clean))
+    assert set(noisy.labels) == {-1, 1}
+    np.testing.assert_array_equal(noisy.values, clean.values)
+    np.testing.assert_array_equal(labelled_data(spec, store, "source", 0).labels, noisy.labels)

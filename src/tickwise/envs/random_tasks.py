@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import TypeAlias, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tickwise.envs.catalog import RANDOM_TASK, EnvironmentSpec
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.planning import best_success_probability, success_probability
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.envs.tasks import TaskTable
-from tickwise.envs.temporal import FormulaTask, sdnf_table
+from tickwise.envs.temporal import Ending, FormulaTask, sdnf_table
 from tickwise.errors import ConfigurationError
 from tickwise.logic.sdnf import SDNF, Operator, Primitive, SequentialConjunction
 from tickwise.logic.syntax import Box, Interval, Not
@@ -46,7 +48,9 @@ class RandomTaskSettings:
         region: A box covers at most this share of the world's cells, or one cell.
         complemented_region: The box of a complement covers at least this share of the world's cells, and not
             all of them: it is its outside that has to be small, or random actions would find it too often.
-        early: The probability that the episode ends as soon as the verdict is determined.
+        disjoint: Whether no cell satisfies two predicates of one disjunct, so that none can stand for two.
+        endings: When episodes end, drawn from these.
+        windows: How many ticks the window of a primitive has.
         solvable: The least probability of success that planning must achieve, by each disjunct alone.
         chances: The chance of the whole formula.
         effect: Dropping a primitive from its disjunct must raise the disjunct's chance by this factor or more.
@@ -66,7 +70,9 @@ class RandomTaskSettings:
     durations: tuple[int, int] = (2, 6)
     region: float = 1 / 6
     complemented_region: float = 0.5
-    early: float = 0.5
+    disjoint: bool = False
+    endings: tuple[Ending, ...] = ("deadline", "violated", "decided")
+    windows: tuple[int, int] = (1, 100)
     solvable: float = 0.95
     chances: tuple[float, float] = (0.005, 0.2)
     effect: float = 2.0
@@ -76,11 +82,18 @@ class RandomTaskSettings:
     compositions: int = 5
 
     def __post_init__(self) -> None:
-        for name, least in (("sizes", 2), ("deadlines", 1), ("disjuncts", 1), ("primitives", 1), ("durations", 1)):
+        for name, least in (
+            ("sizes", 2),
+            ("deadlines", 1),
+            ("disjuncts", 1),
+            ("primitives", 1),
+            ("durations", 1),
+            ("windows", 1),
+        ):
             low, high = getattr(self, name)
             if not least <= low <= high:
                 raise ConfigurationError(f"{name} is {(low, high)}; use a range of whole numbers from {least} on")
-        for name in ("region", "complemented_region", "early", "solvable", "contribution"):
+        for name in ("region", "complemented_region", "solvable", "contribution"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ConfigurationError(f"{name} is {getattr(self, name)!r}; use a number from 0 to 1")
         if not 0 <= self.chances[0] <= self.chances[1] <= 1:
@@ -116,14 +129,14 @@ def random_task(
     """
     settings = RandomTaskSettings() if settings is None else settings
     wanted = None if structure is None else _checked(structure)
-    early = bool(rng.random() < settings.early)
+    ends = settings.endings[int(rng.integers(len(settings.endings)))]
     for _ in range(settings.worlds):
         kinds = _structure(rng, settings) if wanted is None else wanted
         world = GridWorld(_between(rng, settings.sizes))
         arena = _Arena(world.mdp(), _between(rng, settings.deadlines), settings)
         formula = _formula(rng, kinds, world.size, arena)
         if formula is not None:
-            return EnvironmentSpec(RANDOM_TASK, world, FormulaTask(str(formula), arena.deadline, early=early))
+            return EnvironmentSpec(RANDOM_TASK, world, FormulaTask(str(formula), arena.deadline, ends=ends))
     what = "task" if wanted is None else f"task of the structure {structure_text(wanted)}"
     raise ConfigurationError(
         f"no random {what} was found in {settings.worlds} worlds; widen the settings' chances, effect or "
@@ -149,7 +162,7 @@ class _Arena:
 
     def table(self, *disjuncts: SequentialConjunction) -> TaskTable:
         # the same chances as without an early end, in less time
-        return sdnf_table(SDNF(disjuncts), self.mdp, self.deadline, early=True)
+        return sdnf_table(SDNF(disjuncts), self.mdp, self.deadline, ends="decided")
 
     def chance(self, *disjuncts: SequentialConjunction) -> float:
         return success_probability(self.mdp, self.table(*disjuncts))
@@ -264,12 +277,27 @@ def _primitives(
         box = _box(rng, size, complemented, arena.settings)
         if complemented and operator in (Operator.EVENTUALLY, Operator.EVENTUALLY_ALWAYS) and rng.random() < 0.5:
             # the outside of a box is a row of cells or more: in a long window chance nearly always finds it
-            end = min(end, start + duration + _between(rng, (0, 2)))
-        if end - duration < start:
+            end = min(end, start + duration + arena.settings.windows[0] + _between(rng, (-1, 1)))
+        if not arena.settings.windows[0] <= end - duration - start + 1 <= arena.settings.windows[1]:
             return None
         window = Interval(start, end - duration)
         primitives.append(Primitive(operator, window, duration, Not(box) if complemented else box))
+    if arena.settings.disjoint and any(_overlap(*pair, size) for pair in combinations(primitives, 2)):
+        return None
     return tuple(primitives)
+
+
+def _overlap(one: Primitive, other: Primitive, size: int) -> bool:
+    """Whether the predicates of two primitives hold in a cell of a world together."""
+    return bool((_cells(one, size) & _cells(other, size)).any())
+
+
+def _cells(primitive: Primitive, size: int) -> NDArray[np.bool_]:
+    """The cells where the predicate of a primitive holds, shape ``(size, size)``."""
+    cells = np.zeros((size, size), dtype=np.bool_)
+    x, y = (slice(int(bound.lower), int(bound.upper)) for bound in primitive.box.bounds)
+    cells[x, y] = True
+    return ~cells if primitive.complemented else cells
 
 
 def _box(rng: np.random.Generator, size: int, complemented: bool, settings: RandomTaskSettings) -> Box:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,34 +28,43 @@ _STAY_CLOCK = 1
 
 _COLOURS = ("green", "yellow", "blue")
 
+Ending: TypeAlias = Literal["deadline", "violated", "decided"]
+
+ENDINGS: dict[str, tuple[int, ...]] = {"deadline": (), "violated": (-1,), "decided": (-1, 1)}
+"""The ends of an episode that there are, with the verdicts that bring it about before the deadline."""
+
 
 @dataclass(frozen=True, slots=True)
 class FormulaTask:
     """Satisfy a formula by the deadline; it decides at tick 0 of the trajectory s_0 … s_L (Section II-A).
 
-    Without `early` nothing is given before the deadline; there, ``reward`` if the formula is satisfied and
-    ``penalty`` if not. With it the episode ends, with the one or the other, at the first tick from 1 on at
-    which the three-valued semantics determines the verdict, so what tick 0 decides is paid at tick 1.
+    The episode gives ``reward`` if the formula is satisfied and ``penalty`` if not, at its end and nothing
+    before. That is the deadline, or the first tick from 1 on at which the three-valued semantics determines
+    what `ends` says, so what tick 0 decides is paid at tick 1.
 
     Attributes:
         formula: The formula as text; it has to have a sequential disjunctive normal form (Definition 5).
         deadline: The deadline L in ticks; no effect of the formula may reach beyond it.
         reward: Given if the formula is satisfied.
         penalty: Given if it is violated.
-        early: Whether the episode ends as soon as the verdict is determined.
+        ends: When an episode ends: at the ``deadline``, or before it as soon as the formula is ``violated``, or
+            ``decided`` either way.
 
     Raises:
         FormulaError: If the text is no formula, or one without a sequential disjunctive normal form.
-        ConfigurationError: If the deadline is before the formula's end-effect time (Definition 4).
+        ConfigurationError: If the deadline is before the formula's end-effect time (Definition 4), or there is no
+            such end.
     """
 
     formula: str
     deadline: int
     reward: float = 100.0
     penalty: float = -10.0
-    early: bool = False
+    ends: Ending = "deadline"
 
     def __post_init__(self) -> None:
+        if self.ends not in ENDINGS:
+            raise ConfigurationError(f"there is no end of an episode {self.ends!r}; use {', '.join(ENDINGS)}")
         check_ticks("deadline", self.deadline, least=1)
         end = max(disjunct.primitives[-1].end for disjunct in self.sdnf.disjuncts)
         if end > self.deadline:
@@ -86,11 +95,17 @@ class FormulaTask:
         Raises:
             ConfigurationError: If a region contains no cell of the world, or the table would be too large.
         """
-        return sdnf_table(self.sdnf, mdp, self.deadline, reward=self.reward, penalty=self.penalty, early=self.early)
+        return sdnf_table(self.sdnf, mdp, self.deadline, reward=self.reward, penalty=self.penalty, ends=self.ends)
 
 
 def sdnf_table(
-    sdnf: SDNF, mdp: TabularMDP, deadline: int, *, reward: float = 100.0, penalty: float = -10.0, early: bool = False
+    sdnf: SDNF,
+    mdp: TabularMDP,
+    deadline: int,
+    *,
+    reward: float = 100.0,
+    penalty: float = -10.0,
+    ends: Ending = "deadline",
 ) -> TaskTable:
     """The table of a `FormulaTask` whose formula is at hand in normal form; its numbers are not checked.
 
@@ -100,7 +115,7 @@ def sdnf_table(
         deadline: The deadline L in ticks.
         reward: Given if the formula is satisfied.
         penalty: Given if it is violated.
-        early: Whether the episode ends as soon as the verdict is determined.
+        ends: When an episode ends.
 
     Returns:
         The table.
@@ -120,7 +135,7 @@ def sdnf_table(
     whole = reduce(lambda left, right: _either(left, right, most), parts, nothing)
     success = whole.verdict > 0
     gained = np.where(success, reward, penalty).astype(np.float32)
-    ended = early & (whole.verdict != 0)
+    ended = np.isin(whole.verdict, ENDINGS[ends])
     on_arrival = np.where(ended, gained, 0.0).astype(np.float32)
     return TaskTable(
         delta=whole.delta.astype(np.int32),

@@ -168,7 +168,8 @@ def _labelled(
 def labelled_data(spec: StudySpec, store: Store, task: str, run: int) -> LabelledTrajectories:
     """The labelled trajectories of a collection; the state is the robot's position.
 
-    Where label 1 is for lasting long, the last state of these trajectories is left out (Case Study 2).
+    Where label 1 is for lasting long, the last state of these trajectories is left out (Case Study 2). Where there
+    is to be noise, labels are turned round after that.
     """
     mdp = environment_of(spec, task).mdp()
     content = store.load(Job("collect", task, run).name)
@@ -177,7 +178,13 @@ def labelled_data(spec: StudySpec, store: Store, task: str, run: int) -> Labelle
     values = np.where(paths[..., None] >= 0, mdp.coordinates[paths], np.nan)
     ids = tuple(str(number) for number in range(len(paths)))
     data = LabelledTrajectories(values, lengths, labels, mdp.variables, ids)
-    return data if spec.collection.least_ticks is None else data.drop_last(labels == 1)
+    data = data if spec.collection.least_ticks is None else data.drop_last(labels == 1)
+    wrong = round(spec.collection.noise * len(data))
+    if not wrong:
+        return data
+    rng = generator(spec.seed, spec.name, "noise", task, run)
+    turned = np.isin(np.arange(len(data)), rng.choice(len(data), wrong, replace=False))
+    return replace(data, labels=np.where(turned, -data.labels, data.labels))
 
 
 def environment_of(spec: StudySpec, task: str) -> EnvironmentSpec:

@@ -28,6 +28,7 @@ class Collection:
         least_ticks: None gives label 1 to trajectories with a return above 0 (Case Study 1). A number gives it to those
             that last at least so many ticks, and their last state is left out, since the rule may have been broken
             there (Case Study 2).
+        noise: The share of trajectories whose label is turned round before inference, to see what wrong labels do.
     """
 
     episodes: int = 10_000
@@ -36,6 +37,7 @@ class Collection:
     positives: dict[str, int] = field(default_factory=lambda: {"source": 40, "target": 20})
     most_episodes: int = 200_000
     least_ticks: int | None = None
+    noise: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
