@@ -52,10 +52,31 @@ def draw_figures(results: Mapping[str, Any], spec: StudySpec, folder: Path) -> d
                 for suffix in ("svg", "png"):
                     (folder / f"{name}.{suffix}").unlink(missing_ok=True)
                 continue
-            svg = _render(figure, "svg", _SVG_METADATA)
-            write_bytes(folder / f"{name}.svg", svg)
-            write_bytes(folder / f"{name}.png", _render(figure, "png", {"Software": None}))
-            drawn[name] = svg.decode()
+            drawn[name] = _write(figure, folder / name)
+    return drawn
+
+
+def draw_effect(results: Mapping[str, Any], folder: Path) -> dict[str, str]:
+    """Draw what a setting does, as ``name.svg`` and ``name.png``, and apart from it the times, as ``name-time``.
+
+    Args:
+        results: What `tickwise.experiments.effects.effect_results` gave.
+        folder: Where the files go.
+
+    Returns:
+        The SVG text of each figure by name; without times there is one.
+
+    Raises:
+        StoreError: If a file cannot be written.
+    """
+    drawn = {}
+    with _style():
+        from tickwise.experiments.figures import effect
+
+        name = results["summary"]["effect"]
+        for key, figure in ((name, effect.draw(results)), (f"{name}-time", effect.draw_times(results))):
+            if figure is not None:
+                drawn[key] = _write(figure, folder / key)
     return drawn
 
 
@@ -101,6 +122,14 @@ def _painters() -> dict[str, Any]:
         "curves": curves.draw, "boxplot": convergence.draw_boxplot,
         "convergence": convergence.draw_convergence,
     }  # fmt: skip
+
+
+def _write(figure: Figure, path: Path) -> str:
+    """Write a figure as SVG and PNG, the suffixes to be added; the SVG text comes back."""
+    svg = _render(figure, "svg", _SVG_METADATA)
+    write_bytes(path.with_name(f"{path.name}.svg"), svg)
+    write_bytes(path.with_name(f"{path.name}.png"), _render(figure, "png", {"Software": None}))
+    return svg.decode()
 
 
 def _render(figure: Figure, kind: str, metadata: dict[str, None]) -> bytes:
