@@ -19,6 +19,7 @@ from tickwise.inference.tree import (
     classification_rate,
     infer_tree,
     is_satisfying,
+    pruned,
 )
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, Operator, SequentialConjunction, to_sdnf
@@ -258,3 +259,28 @@ def test_data_that_has_nothing_to_tell_apart():
 def test_wrong_settings(wrong):
     with pytest.raises(ConfigurationError, match=next(iter(wrong))):
         InferenceSettings(**wrong)
+
+
+def test_a_disjunct_that_is_not_needed_is_pruned():
+    # label 1 iff high at tick 1; the second disjunct says nothing of any positive, the third is one positive's alone
+    data = binary([[0, 1, 0], [0, 1, 1], [1, 1, 0], [0, 0, 1], [1, 0, 0], [0, 0, 0]], [1, 1, 1, -1, -1, -1])
+    needed, idle, other = "F[1,1] (x >= 1)", "G[0,2] (x >= 1)", "G[1,2] (x >= 1)"
+    settings = InferenceSettings(rate=1.0)
+    whole = to_sdnf(parse(f"{idle} | {needed} | {other}"))
+    assert str(pruned(whole, data, settings)) == needed
+    assert pruned(to_sdnf(parse(needed)), data, settings) == to_sdnf(parse(needed))
+    # what is not satisfying stays as it is
+    wrong = to_sdnf(parse(f"{idle} | {other}"))
+    assert pruned(wrong, data, settings) == wrong
+
+
+@given(sdnfs(longest=2), st.integers(0, 1_000))
+@settings(max_examples=40, deadline=None)
+def test_pruning_keeps_a_formula_satisfying_and_leaves_no_disjunct_to_spare(rule: SDNF, seed: int):
+    data = ragged_walks(seed, 4, 6, 30, rule)
+    constraints = InferenceSettings(size=20, rate=0.9)
+    found = pruned(rule, data, constraints)
+    assert set(found.disjuncts) <= set(rule.disjuncts)
+    assert is_satisfying(found, data, constraints) == is_satisfying(rule, data, constraints)
+    if is_satisfying(found, data, constraints) and found != rule:
+        assert found.size < rule.size

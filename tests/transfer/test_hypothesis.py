@@ -14,12 +14,19 @@ from tickwise.inference.prior import BoxPrior
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.inference.tree import InferenceSettings, classification_rate
+from tickwise.inference.tree import DecisionTree, InferenceSettings, classification_rate, is_satisfying
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, to_sdnf
-from tickwise.logic.structure import structurally_transferable
+from tickwise.logic.structure import structurally_equivalent, structurally_transferable
 from tickwise.logic.syntax import Verdict
-from tickwise.transfer.hypothesis import Task, require_transferable, tick_tables, transfer_structure
+from tickwise.transfer.hypothesis import (
+    PARTS,
+    Task,
+    require_transferable,
+    source_formula,
+    tick_tables,
+    transfer_structure,
+)
 
 TICKS = 12
 SWARM = SwarmSettings(particles=30, iterations=40, restarts=1)
@@ -41,7 +48,7 @@ def task(rng: np.random.Generator, rule: str, n: int = 60, wanted: int = 25, sho
     return Task(data, BoxPrior({"x": (0.0, 10.0)}, TICKS), SearchSpace.grid(10, TICKS, ("x",)))
 
 
-def outcome(source: Task, target: Task, settings: InferenceSettings, done: Callable[[int], None] | None = None):
+def outcome(source: Task, target: Task, settings: InferenceSettings, done: Callable[[str], None] | None = None):
     rngs = np.random.default_rng(1), np.random.default_rng(2)
     return transfer_structure(source, target, settings, SWARM, *rngs, done)
 
@@ -49,10 +56,10 @@ def outcome(source: Task, target: Task, settings: InferenceSettings, done: Calla
 def test_similar_tasks_are_identified_as_transferable():
     rng = np.random.default_rng(0)
     settings = InferenceSettings(size=2, depth=1)
-    steps: list[int] = []
+    steps: list[str] = []
     found = outcome(task(rng, "F[1,10] (7 <= x <= 8)"), task(rng, "F[2,11] (1 <= x <= 2)"), settings, steps.append)
     assert found.transferable, found.reason
-    assert steps == [1, 2]
+    assert tuple(steps) == PARTS
     source, target = require_transferable(found)
     assert structurally_transferable(target, source)
     assert found.source_satisfying
@@ -77,6 +84,23 @@ def test_similar_tasks_whose_episodes_end_at_any_tick_are_transferable(source: s
         assert classification_rate(formula, data) >= 0.9
 
 
+def test_what_the_tree_chose_too_early_is_mended_by_a_joint_fit():
+    rng = np.random.default_rng(7)
+    rule = "F[1,4] (7 <= x <= 8) & F[6,11] (1 <= x <= 4)"
+    source, settings = task(rng, rule), InferenceSettings(size=2, rate=0.95)
+    greedy = to_sdnf(parse("F[1,9] (6 <= x <= 9) & F[10,11] (1 <= x <= 4)")).disjuncts[0]
+    tree = DecisionTree(greedy.primitives, 2, 20, 0, "I", 1)
+    assert not is_satisfying(tree.formula, source.data, settings)
+    found = source_formula(tree, source, settings, SWARM, rng)
+    assert found is not None
+    assert is_satisfying(found, source.data, settings)
+    assert structurally_equivalent(found, SDNF((greedy,)))
+    # nothing of this structure says that the labels are drawn by lot
+    labels = np.resize([1, -1], len(source.data)).astype(np.int8)
+    lot = LabelledTrajectories(source.data.values, source.data.lengths, labels, ("x",), source.data.ids)
+    assert source_formula(tree, Task(lot, source.prior, source.space), settings, SWARM, rng) == tree.formula
+
+
 def test_tasks_that_are_not_similar_are_refused_with_the_reason():
     rng = np.random.default_rng(3)
     # a size of one leaves room for a single primitive, and the target's rule is no ◇
@@ -95,11 +119,11 @@ def test_a_source_without_a_satisfying_formula_ends_at_step_1():
     noise = task(rng, "F[1,10] (7 <= x <= 8)")
     labels = rng.permuted(noise.data.labels)
     data = LabelledTrajectories(noise.data.values, noise.data.lengths, labels, noise.data.variables, noise.data.ids)
-    steps: list[int] = []
+    steps: list[str] = []
     found = outcome(Task(data, noise.prior, noise.space), noise, InferenceSettings(depth=1, rate=0.99), steps.append)
     assert not found.transferable
     assert found.fit is None
-    assert steps == [1]
+    assert steps == ["tree", "source"]
     assert "source" in found.reason
 
 

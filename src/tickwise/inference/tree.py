@@ -275,6 +275,29 @@ def classification_rate(
     return float(weights[signature == (data.labels == 1)].sum() / weights.sum())
 
 
+def pruned(phi: SDNF, data: LabelledTrajectories, settings: InferenceSettings) -> SDNF:
+    """A satisfying formula less the disjuncts that it does not need, those that say least of the positives first.
+
+    A leaf of a decision tree may hold the few trajectories that were on the wrong side above it. Its path formula says
+    nothing of the task, but would become part of the structure that is transferred.
+
+    Args:
+        phi: A formula.
+        data: Labelled trajectories.
+        settings: The constraints of Problem 1.
+
+    Returns:
+        The formula with the fewest such disjuncts; as it is where it is not satisfying.
+    """
+    positives = data.select(data.labels == 1)
+    by_use = sorted(phi.disjuncts, key=lambda disjunct: formula_signature(SDNF((disjunct,)), positives).sum())
+    for disjunct in by_use:
+        rest = tuple(other for other in phi.disjuncts if other != disjunct)
+        if rest and is_satisfying(SDNF(rest), data, settings):
+            phi = SDNF(rest)
+    return phi
+
+
 def is_satisfying(phi: SDNF | None, data: LabelledTrajectories, settings: InferenceSettings) -> bool:
     """Whether a formula meets the classification and the size constraint of Problem 1; None does not."""
     if phi is None or phi.size > settings.size:

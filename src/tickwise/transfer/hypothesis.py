@@ -11,13 +11,17 @@ from tickwise.automata.build import timed_automata
 from tickwise.automata.model import TimedAutomaton
 from tickwise.automata.ticks import TickTable
 from tickwise.errors import NotTransferableError
+from tickwise.inference.objective import formula_signature
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
-from tickwise.inference.template import TransferFit, fit_transferable
+from tickwise.inference.template import TransferFit, fit_structure, fit_transferable
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.inference.tree import DecisionTree, InferenceSettings, infer_tree, is_satisfying
+from tickwise.inference.tree import DecisionTree, InferenceSettings, infer_tree, is_satisfying, pruned
 from tickwise.logic.sdnf import SDNF
+
+PARTS = ("tree", "source", "target")
+"""What Steps 1 and 2 consist of: Algorithm 1 and φ^S, which make up Step 1, and φ^T."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +77,7 @@ def transfer_structure(
     swarm: SwarmSettings,
     source_rng: np.random.Generator,
     target_rng: np.random.Generator,
-    done: Callable[[int], None] | None = None,
+    done: Callable[[str], None] | None = None,
 ) -> Hypothesis:
     """Infer φ^S by Algorithm 1 (Step 1), then fit a structurally transferable φ^T (Step 2).
 
@@ -84,22 +88,56 @@ def transfer_structure(
         swarm: The settings of the particle swarm.
         source_rng: Draws of Step 1.
         target_rng: Draws of Step 2.
-        done: Told the number of each step, 1 or 2, when it is done; for who shows progress or measures time.
+        done: Told which of `PARTS` is done, each in turn; for who shows progress or measures time.
 
     Returns:
         What was inferred, and whether logical transferability is identified.
     """
     tree = infer_tree(source.data, source.prior, source.space, settings, swarm, source_rng)
-    formula = tree.formula
-    satisfying = formula is not None and is_satisfying(formula, source.data, settings)
     if done is not None:
-        done(1)
+        done("tree")
+    formula = source_formula(tree, source, settings, swarm, source_rng)
+    satisfying = is_satisfying(formula, source.data, settings)
+    if done is not None:
+        done("source")
     fit = None
     if formula is not None and satisfying:
         fit = fit_transferable(target.data, target.prior, target.space, formula, settings, swarm, target_rng)
         if done is not None:
-            done(2)
+            done("target")
     return Hypothesis(tree, formula, satisfying, fit)
+
+
+def source_formula(
+    tree: DecisionTree, source: Task, settings: InferenceSettings, swarm: SwarmSettings, rng: np.random.Generator
+) -> SDNF | None:
+    """The formula of a decision tree, pruned; where it is not satisfying, its parameters are optimised together.
+
+    Algorithm 1 chooses the primitives one by one: an earlier one that takes ticks from a later one is never mended. As
+    Step 2 does in the target, the operators are fixed here and all parameters fitted jointly, those of the disjunct
+    that says most of the positives alone, and those of all disjuncts.
+
+    Args:
+        tree: The source's decision tree.
+        source: The source task's data.
+        settings: The constraints of Problem 1.
+        swarm: The settings of the particle swarm.
+        rng: The source of all randomness.
+
+    Returns:
+        The first satisfying formula of these; the tree's where there is none, and None where it has none.
+    """
+    formula = tree.formula
+    if formula is None or is_satisfying(formula, source.data, settings):
+        return formula and pruned(formula, source.data, settings)
+    positives = source.data.select(source.data.labels == 1)
+    main = max(formula.disjuncts, key=lambda disjunct: formula_signature(SDNF((disjunct,)), positives).sum())
+    for start in dict.fromkeys((SDNF((main,)), formula)):
+        if start.size <= settings.size:
+            fit = fit_structure(source.data, source.prior, source.space, start, settings, swarm, rng, start=start)
+            if fit.satisfying:
+                return fit.formula
+    return formula
 
 
 def tick_tables(formula: SDNF, horizon: int, *, reduce: bool = True) -> tuple[TickTable, ...]:
