@@ -128,8 +128,8 @@ def test_results_have_a_number_for_each_value_and_collection(results: dict[str, 
 def test_results_are_plain_and_times_are_apart(results: dict[str, Any]):
     assert json.loads(json.dumps(results)) == results
     assert "seconds" not in json.dumps(results["summary"])
-    assert list(results["times"]["measures"]) == ["step_1"]
-    assert all(second > 0 for row in results["times"]["measures"]["step_1"]["runs"] for second in row)
+    assert list(results["times"]["measures"]) == ["algorithm_1"]
+    assert all(second > 0 for row in results["times"]["measures"]["algorithm_1"]["runs"] for second in row)
 
 
 def test_each_collection_is_the_same_for_all_values(carried_out: tuple[list[Unit], list[Store]]):
@@ -148,9 +148,11 @@ def test_a_second_call_does_nothing_and_gives_the_same(
     assert {path: path.stat().st_mtime_ns for path in files} == files
 
 
-def test_a_power_law_is_found():
-    sizes = [[10.0, 20.0], [40.0, 80.0]]
-    # t = 3 N², whatever is missing
-    assert effects._power(sizes, [[300.0, 1200.0], [None, 19200.0]]) == pytest.approx(2.0)
-    assert effects._power([[10.0, 10.0]], [[1.0, 2.0]]) is None
-    assert effects._power(sizes, [[None, 0.0], [None, None]]) is None
+def test_the_growth_of_time_is_a_straight_line_from_the_own_value_on():
+    sizes = [[10.0, 20.0], [100.0, 200.0], [400.0, 800.0]]
+    # t = 2 + 3 N / 1,000 from the value 2 on, whatever comes before and whatever is missing
+    seconds = [[70.0, 80.0], [2.3, 2.6], [None, 4.4]]
+    growth = effects._growth([1, 2, 4], 2, sizes, seconds)
+    assert growth == pytest.approx({"fixed": 2.0, "per_thousand": 3.0, "from": 100.0})
+    assert effects._growth([1, 2, 4], 4, sizes, seconds) is None  # one number only
+    assert effects._growth([1, 2, 4], 9, sizes, seconds) is None

@@ -242,7 +242,7 @@ def test_the_cost_of_an_inference_has_its_steps(finished: Path, tmp_path: Path):
     (folder / "artefacts" / "infer-0.json").unlink()
     store = Store(folder)
     perform(Job("infer", "", 0), with_learning(most_episodes={}), store, silent)
-    assert tuple(store.load("cost-infer-0")["step_seconds"]) == STEPS[:2]
+    assert tuple(store.load("cost-infer-0")["step_seconds"]) == STEPS[:3]
     assert store.load("infer-0")["target_without_information"] is None  # nobody would learn with it
     for part in ("source", "target"):
         assert store.load("infer-0")[part] == open_store(finished).load("infer-0")[part]
@@ -254,8 +254,8 @@ def test_an_inference_that_ends_at_step_1_costs_no_more(tmp_path: Path):
         perform(Job("collect", task, 0), HOPELESS, store, silent)
     told: list[tuple[int, ...]] = []
     perform(Job("infer", "", 0), HOPELESS, store, lambda *step: told.append(step))
-    assert tuple(store.load("cost-infer-0")["step_seconds"]) == STEPS[:1]
-    assert told == [(0, 3), (1, 3)]
+    assert tuple(store.load("cost-infer-0")["step_seconds"]) == STEPS[:2]
+    assert told == [(0, 4), (1, 4), (2, 4)]
 
 
 def test_noise_turns_the_labels_of_a_share_round(finished: Path):

@@ -136,7 +136,7 @@ def effect_results(effect: Effect, units: Sequence[Unit], stores: Sequence[Store
     for unit, store in zip(units, stores, strict=True):
         groups.setdefault(effect.value(unit.spec), []).append(Finished(unit.spec, store))
     first = units[0].spec
-    summary = {
+    summary: dict[str, Any] = {
         "effect": effect.name, "study": first.name, "quick": first.short, "seed": first.seed,
         "runs": len(units) // len(groups), "version": version("tickwise"), "command": command(effect, units),
         "symbol": effect.symbol, "axis": effect.axis, "values": list(groups),
@@ -151,7 +151,7 @@ def effect_results(effect: Effect, units: Sequence[Unit], stores: Sequence[Store
     if effect.size is not None:
         size = times["size"] = _measured(effect.size, groups)
         for measured in times["measures"].values():
-            measured["power"] = _power(size["runs"], measured["runs"])
+            measured["growth"] = _growth(summary["values"], summary["own"], size["runs"], measured["runs"])
     return {"summary": summary, "times": times}
 
 
@@ -197,15 +197,21 @@ def _mark(measure: Measure, specs: Sequence[StudySpec]) -> dict[str, Any] | None
     return {"name": name, "value": first} if first == last else None
 
 
-def _power(sizes: Sequence[Sequence[float]], seconds: Sequence[Sequence[float | None]]) -> float | None:
-    """The power of the problem's size that times grow with: the slope of a straight line through their logarithms."""
+def _growth(
+    values: Sequence[float], own: float, sizes: Sequence[Sequence[float]], seconds: Sequence[Sequence[float | None]]
+) -> dict[str, float] | None:
+    """How time grows with the problem's size: the straight line that fits from the study's own value on.
+
+    Below that, a formula is often of another structure, and so another search.
+    """
     pairs = [
         (size, time)
-        for row, times in zip(sizes, seconds, strict=True)
+        for value, row, times in zip(values, sizes, seconds, strict=True)
         for size, time in zip(row, times, strict=True)
-        if time
+        if value >= own and time is not None
     ]
     if len({size for size, _ in pairs}) < 2:
         return None
-    x, y = np.log(np.array(pairs, dtype=np.float64)).T
-    return float(np.polyfit(x, y, 1)[0])
+    x, y = np.array(pairs, dtype=np.float64).T
+    slope, fixed = np.polyfit(x, y, 1)
+    return {"fixed": float(fixed), "per_thousand": 1000 * float(slope), "from": float(x.min())}

@@ -32,7 +32,7 @@ from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.rl.qlearning import Problem, collect, evaluate, learn
 from tickwise.rl.states import automaton_memory, disjunct_choice, tau_memory
-from tickwise.transfer.hypothesis import Task, tick_tables, transfer_structure
+from tickwise.transfer.hypothesis import PARTS, Task, tick_tables, transfer_structure
 from tickwise.transfer.qtransfer import transfer_q
 
 Report = Callable[[int, int], None]
@@ -201,8 +201,8 @@ def inference_task(spec: StudySpec, store: Store, task: str, run: int) -> Task:
     return Task(labelled_data(spec, store, task, run), prior, space)
 
 
-STEPS = ("step_1", "step_2", "plain")
-"""What an inference consists of: Steps 1 and 2, and Step 2 without the information gain."""
+STEPS = (*PARTS, "plain")
+"""What an inference consists of: the parts of Steps 1 and 2, and Step 2 without the information gain."""
 
 
 def _infer(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
@@ -217,9 +217,9 @@ def _infer(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
     _compile_inference()
     marks = [time.process_time()]
 
-    def done(step: int) -> None:
+    def done(step: str) -> None:
         marks.append(time.process_time())
-        report(step, len(STEPS))
+        report(STEPS.index(step) + 1, len(STEPS))
 
     found = transfer_structure(source, target, spec.inference, spec.swarm, rngs[0], rngs[1], done)
     manifest: dict[str, Any] = {
@@ -241,7 +241,7 @@ def _infer(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
         plain = replace(spec.inference, information_weight=0.0)
         fit = fit_transferable(target.data, target.prior, target.space, found.source, plain, spec.swarm, rngs[2])
         manifest["target_without_information"] = _fit(fit.attempts[-1])
-        done(3)
+        done("plain")
     seconds = {name: round(now - before, 4) for name, (before, now) in zip(STEPS, pairwise(marks), strict=False)}
     return _Outcome(manifest, cost={"step_seconds": seconds})
 

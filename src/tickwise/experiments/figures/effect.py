@@ -23,7 +23,7 @@ _LEFT, _BELOW, _ABOVE, _BETWEEN = 0.72, 0.55, 0.5, 0.88
 _CHARACTER = 0.083
 _SYMBOLS = {
     "φˢ": r"$\varphi^{\mathrm{S}}$", "φᵀ": r"$\varphi^{\mathrm{T}}$", "hₘₐₓ": r"$h_{\mathrm{max}}$",
-    "ϱₜₕ": r"$\varrho_{\mathrm{th}}$", "V*": "$V^*$", "N⁻": "$N^{-}$",
+    "ϱₜₕ": r"$\varrho_{\mathrm{th}}$", "V*": "$V^*$", "N⁻": "$N^{-}$", "source, N": "source, $N$",
 }  # fmt: skip
 
 Data = Mapping[str, Any]
@@ -59,7 +59,7 @@ def draw_times(results: Data) -> Figure | None:
             _over_values(axes, summary, measure, VERMILION)
         else:
             _over_sizes(axes, size, measure, VERMILION)
-    _legend(figure, VERMILION, {"runs", "own" if size is None else "power"})
+    _legend(figure, VERMILION, {"runs", "own" if size is None else "growth"})
     return figure
 
 
@@ -107,32 +107,29 @@ def _over_values(axes: Axes, summary: Data, measure: Data, colour: str) -> None:
 
 
 def _over_sizes(axes: Axes, size: Data, measure: Data, colour: str) -> None:
-    """Times on logarithmic axes, where a power of the size is a straight line."""
+    """Times on logarithmic axes, since sizes go by factors."""
     _runs(axes, size["runs"], measure, colour)
     places = _numbers(size["middle"])
     _middle(axes, places, measure, colour)
     axes.set(xscale="log", yscale="log")
-    if measure["power"] is not None:
-        _powers(axes, size, measure)
+    if measure["growth"] is not None:
+        _growth(axes, size, measure["growth"])
     axes.xaxis.set_major_locator(FixedLocator(places.tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_xticklabels([f"{place:.0f}" for place in places], fontsize=8.5)
-    axes.yaxis.set_major_locator(FixedLocator([0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500]))
+    axes.yaxis.set_major_locator(FixedLocator([factor * 10.0**power for power in range(-3, 4) for factor in (1, 2, 5)]))
     axes.yaxis.set_minor_locator(NullLocator())
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     _words(axes, measure, size["title"])
 
 
-def _powers(axes: Axes, size: Data, measure: Data) -> None:
-    """The straight line that fits the times, and one as steep as time in proportion to the size."""
-    power = measure["power"]
-    x = np.array([value for row in size["runs"] for value in row], dtype=np.float64)
-    y = np.concatenate([_numbers(row) for row in measure["runs"]])
-    centre, level = np.log(x[y > 0]).mean(), np.log(y[y > 0]).mean()
-    ends = np.array([x.min(), x.max()])
-    for slope, line, ink in ((power, (0, (5, 2)), INK), (1.0, (0, (1.2, 2.2)), MUTED)):
-        axes.plot(ends, np.exp(level + slope * (np.log(ends) - centre)), linestyle=line, color=ink, linewidth=1.2)
-    axes.text(0.04, 0.94, f"time ∝ $N^{{{power:.2f}}}$", transform=axes.transAxes, va="top", fontsize=9.5)
+def _growth(axes: Axes, size: Data, growth: Data) -> None:
+    """The straight line that fits, bent by the logarithmic axes, and what it says."""
+    x = np.geomspace(growth["from"], max(value for row in size["runs"] for value in row))
+    y = growth["fixed"] + growth["per_thousand"] * x / 1000
+    axes.plot(x[y > 0], y[y > 0], linestyle=(0, (5, 2)), color=INK, linewidth=1.3, zorder=5)
+    text = f"{growth['fixed']:.2g} s + {growth['per_thousand']:.2g} s · $N$ / 1,000"
+    axes.text(0.97, 0.05, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=9.5)
 
 
 def _runs(axes: Axes, places: Sequence[Sequence[float]], measure: Data, colour: str) -> None:
@@ -184,10 +181,7 @@ def _legend(figure: Figure, colour: str, kinds: set[str]) -> None:
         ],
         "share": [Patch(facecolor=colour, alpha=0.75, label="share of the collections")],
         "own": [Line2D([], [], color=MUTED, linestyle=dotted, linewidth=1.3, label="the study’s own value")],
-        "power": [
-            Line2D([], [], color=INK, linestyle=dashed, linewidth=1.2, label="the power that fits"),
-            Line2D([], [], color=MUTED, linestyle=dotted, linewidth=1.2, label="in proportion to $N$"),
-        ],
+        "growth": [Line2D([], [], color=INK, linestyle=dashed, linewidth=1.3, label="linear growth that fits")],
     }  # fmt: skip
     handles = [handle for kind, group in entries.items() if kind in kinds for handle in group]
     figure.legend(
