@@ -24,7 +24,7 @@ from tickwise.cli import app, main
 
 ROOT = Path(tests.__file__).parents[1]
 NAVAL = ROOT.parent / "shared" / "data" / "naval" / "naval.npz"
-COMMANDS = ("reproduce", "infer", "check", "automaton", "compare", "report")
+COMMANDS = ("reproduce", "infer", "check", "automaton", "compare", "report", "effect")
 FORMULA = "F[0,2] (x >= 3)"
 PLAIN = {"PATH": os.environ.get("PATH", ""), "HOME": os.environ.get("HOME", ""), "TERM": "dumb", "NO_COLOR": "1"}
 
@@ -143,6 +143,8 @@ def test_typers_runner_works_too():
         (("reproduce", "case1", "--runs", "0"), "'--runs'"),
         (("reproduce", "case1", "--seed", "-1"), "'--seed'"),
         (("reproduce", "case1", "--runs", "many"), "'--runs'"),
+        (("effect",), "Missing argument 'name'"),
+        (("effect", "tau", "--runs", "0"), "'--runs'"),
         (("infer", "logs.csv", "--seed", "-1"), "'--seed'"),
         (("infer", "logs.csv", "--depth", "0"), "'--depth'"),
         (("check", FORMULA), "Missing argument 'data'"),
@@ -160,6 +162,16 @@ def test_a_wrong_command_line_is_one_line(tickwise: Tickwise, arguments: tuple[s
 
 def test_an_unknown_study_names_those_there_are(tickwise: Tickwise, tmp_path: Path):
     line = tickwise.fails("reproduce", "case7", "--out", tmp_path / "run")
+    assert line.startswith("there is no study 'case7'; choose case1")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_effect_names_those_there_are(tickwise: Tickwise, tmp_path: Path):
+    line = tickwise.fails("effect", "gamma", "--out", tmp_path / "run")
+    assert line == (
+        "there is no effect 'gamma'; choose trajectories, depth, noisy-depth, information-weight, rate, tau"
+    )
+    line = tickwise.fails("effect", "tau", "--study", "case7", "--out", tmp_path / "run")
     assert line.startswith("there is no study 'case7'; choose case1")
     assert list(tmp_path.iterdir()) == []
 
@@ -455,6 +467,22 @@ def test_compare(tickwise: Tickwise):
 
 @pytest.mark.usefixtures("studies")
 class TestStudies:
+    def test_effect_and_report(self, tickwise: Tickwise, tmp_path: Path):
+        folder = tmp_path / "run"
+        command = ("effect", "rate", "--study", "tiny", "--quick", "--out", folder, "--workers", 1)
+        first = tickwise(*command)
+        assert first.status == 0
+        assert "at ζ =" in first.out
+        assert "Number of disjuncts of φᵀ" in first.out
+        assert first.out.splitlines()[-1] == f"report: {folder / 'report.html'}"
+        assert {path.name for path in (folder / "figures").iterdir()} == {"rate.svg", "rate.png"}
+        assert "The least classification rate" in (folder / "report.html").read_text(encoding="utf-8")
+        assert tickwise("report", folder).out == first.out
+        assert "another configuration (its " in tickwise.fails("effect", "tau", "--study", "tiny", "--out", folder)
+        again = tickwise(*command)
+        assert again.out == first.out
+        assert "finished before" in again.err
+
     def test_reproduce_and_report(
         self, tickwise: Tickwise, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ):

@@ -7,11 +7,12 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import wraps
 from importlib.metadata import version as package_version
 from pathlib import Path
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
@@ -19,6 +20,9 @@ from rich.table import Table
 from rich.text import Text
 
 from tickwise.errors import ConfigurationError, TickwiseError
+
+if TYPE_CHECKING:
+    from tickwise.experiments.suites import Suite
 
 app = typer.Typer(
     name="tickwise",
@@ -135,37 +139,108 @@ def _options(
 @app.command()
 @_command
 def reproduce(
-    study: Annotated[str, typer.Argument(help="The study: case1.")],
+    study: Annotated[str, typer.Argument(help="What: case1, case2, random (pairs of tasks), or all.")],
     runs: Annotated[int | None, typer.Option(min=1, help="Independent runs (10; 3 with --quick).")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer runs and episodes.")] = False,
+    tasks: Annotated[int | None, typer.Option(min=1, help="Random pairs of tasks (50; 4 with --quick).")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, episodes and tasks.")] = False,
     out: Annotated[Path | None, typer.Option(help="The run folder (runs/STUDY or runs/STUDY-quick).")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes (one a core).")] = None,
     seed: Annotated[int, typer.Option(min=0, help="The root seed.")] = 0,
 ) -> None:
-    """Reproduce a case study of the paper, with a report; a second call goes on where the first one stopped.
+    """Reproduce the paper's case studies, with a report; a second call goes on where the first one stopped.
 
     For example: tickwise reproduce case1 --quick --out runs/look
     """
-    from tickwise.experiments.case_studies import find_study
+    from tickwise.experiments.case_studies import STUDIES, find_study
     from tickwise.experiments.progress import Display
     from tickwise.experiments.publish import publish
     from tickwise.experiments.runner import default_workers, run_study
+    from tickwise.experiments.suites import find_suite
 
-    spec = find_study(study, quick=quick, runs=runs, seed=seed)
     folder = out or Path("runs") / (f"{study}-quick" if quick else study)
+    if study in ("random", "all"):
+        _carry_out(find_suite(study, tasks=tasks, runs=runs, seed=seed, quick=quick), folder, workers)
+        return
+    if study not in STUDIES:
+        raise ConfigurationError(f"there is no study {study!r}; choose {', '.join(STUDIES)}, random or all")
+    if tasks is not None:
+        raise ConfigurationError(f"{study} has no random tasks; leave --tasks out, or reproduce random or all")
+    spec = find_study(study, quick=quick, runs=runs, seed=seed)
     count = workers or default_workers()
     began = time.monotonic()
-    try:
+    with _resumable(folder):
         store = run_study(spec, folder, count, Display(messages))
         summary = publish(spec, store, count, time.monotonic() - began)
+    _show_summary(summary)
+    output.print(f"report: {folder / 'report.html'}")
+
+
+def _carry_out(suite: Suite, folder: Path, workers: int | None) -> None:
+    """Do all that belongs to a suite, and show what it gave."""
+    from tickwise.experiments.progress import Display
+    from tickwise.experiments.publish import publish_suite
+    from tickwise.experiments.runner import default_workers, run_units
+    from tickwise.experiments.store import Store
+
+    count = workers or default_workers()
+    began = time.monotonic()
+    with _resumable(folder):
+        Store.open(folder, suite.as_dict())
+        stores = run_units(suite.units(folder).all, count, Display(messages))
+        summary = publish_suite(suite, folder, stores, count, time.monotonic() - began)
+    _show_suite(summary, folder)
+
+
+@contextmanager
+def _resumable(folder: Path) -> Iterator[None]:
+    """Say on Ctrl-C that nothing is lost."""
+    try:
+        yield
     except KeyboardInterrupt:
         raise KeyboardInterrupt(
             f"interrupted; what is finished is kept in {folder}: run the same command again to go on"
         ) from None
-    _show_summary(summary, folder)
 
 
-def _show_summary(summary: Mapping[str, Any], folder: Path) -> None:
+def _show_suite(summary: Mapping[str, Any], folder: Path) -> None:
+    from tickwise.experiments.store import read_json
+
+    for name, study in summary["studies"].items():
+        output.print(f"== {name}")
+        _show_summary(study)
+    if "random" in summary:
+        _show_pairs(summary["random"])
+    for name, effect in summary["effects"].items():
+        _show_effect(name, effect, read_json(folder / "times" / f"{name}.json"))
+    output.print(f"report: {folder / 'report.html'}")
+
+
+def _show_pairs(found: Mapping[str, Any]) -> None:
+    output.print("== random pairs of tasks")
+    for kind, verb in (("similar", "identified"), ("dissimilar", "refused")):
+        row = found["identification"][kind]
+        output.print(f"{kind} pairs {verb}: {row['right']} of {row['of']}")
+    for pair, measures in found["speed_ups"].items():
+        goal = measures["goal"]
+        if goal["median"] is not None:
+            interval = f"[{goal['low']:.1f}, {goal['high']:.1f}]"
+            output.print(f"{pair} by the goal: median {goal['median']:.1f} {interval} over {goal['count']} pairs")
+
+
+def _show_effect(name: str, effect: Mapping[str, Any], times: Mapping[str, Any]) -> None:
+    """A column a value, since there are more measures than fit side by side."""
+    table = Table(title=f"{name}, on {effect['study']}: medians, and shares of the collections", title_justify="left")
+    table.add_column(f"at {effect['symbol']} =")
+    for value in effect["values"]:
+        table.add_column(f"{value:g}", justify="right")
+    for measure in (*effect["measures"].values(), *times["measures"].values()):
+        cells = ("none" if middle is None else format(middle, measure["form"]) for middle in measure["middle"])
+        unit = ", seconds" if measure["unit"] == "seconds" else ""
+        table.add_row(measure["title"] + unit, *cells)
+    output.print(table)
+
+
+def _show_summary(summary: Mapping[str, Any]) -> None:
     for name, formula in summary["formulas"].items():
         output.print(f"{name.replace('_', ' ')}: {formula or 'none'}")
     output.print(f"logically transferable: {'yes' if summary['transferable'] else 'no'}")
@@ -190,7 +265,6 @@ def _show_summary(summary: Mapping[str, Any], folder: Path) -> None:
         if found["value"] is not None:
             least = "at least " if found["at_least"] else ""
             output.print(f"{pair} by the goal: {least}{found['value']:.1f} times fewer episodes")
-    output.print(f"report: {folder / 'report.html'}")
 
 
 def _episodes(statistics: Mapping[str, Any], runs: int) -> str:
@@ -363,4 +437,34 @@ def report(
     """
     from tickwise.experiments.publish import republish
 
-    _show_summary(republish(folder), folder)
+    summary = republish(folder)
+    if "suite" in summary:
+        _show_suite(summary, folder)
+        return
+    _show_summary(summary)
+    output.print(f"report: {folder / 'report.html'}")
+
+
+@app.command()
+@_command
+def effect(
+    name: Annotated[
+        str,
+        typer.Argument(help="The setting: trajectories, depth, noisy-depth, information-weight, rate, or tau."),
+    ],
+    study: Annotated[str | None, typer.Option(help="The study that it is measured on (the telling one).")] = None,
+    runs: Annotated[int | None, typer.Option(min=1, help="Collections a value (3; 1 with --quick).")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="Few values.")] = False,
+    out: Annotated[Path | None, typer.Option(help="The run folder (runs/effect-NAME).")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes (one a core).")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="The root seed.")] = 0,
+) -> None:
+    """Measure what a setting does, with a plot: inference, formulas and learning under several values of it.
+
+    For example: tickwise effect rate --quick
+    """
+    from tickwise.experiments.suites import effect_suite
+
+    suite = effect_suite(name, study=study, runs=runs, seed=seed, quick=quick)
+    folder = out or Path("runs") / (f"effect-{name}" + "-quick" * quick)
+    _carry_out(suite, folder, workers)

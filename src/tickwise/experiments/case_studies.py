@@ -11,6 +11,7 @@ from tickwise.envs.catalog import (
     CASE_STUDY_2_TARGET,
 )
 from tickwise.errors import ConfigurationError
+from tickwise.experiments.random_pairs import find_pair
 from tickwise.experiments.study import Collection, Goal, Learning, Published, StudySpec
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.tree import InferenceSettings
@@ -85,15 +86,15 @@ CASE_STUDY_2 = StudySpec(
         (
             "Least classification rate ζ",
             "0.95 in both case studies.",
-            "0.99 here. The labels are free of noise: a positive trajectory obeys the rule to its end, and a negative one "
-            "breaks it. At 0.95 a single formula is satisfying in most collections, □◇ of the block of cells that covers "
-            "both blue regions and the cell between them (rate 0.94 to 0.98), and no disjunction is needed.",
+            "0.99 here. The labels are free of noise: a positive trajectory obeys the rule to its end, and a negative "
+            "one breaks it. At 0.95 a single formula is satisfying in most collections, □◇ of the block of cells that "
+            "covers both blue regions and the cell between them (rate 0.94 to 0.98), and no disjunction is needed.",
         ),
         (
             "Windows beyond the episode",
             "□[0,25] ◇[0,8] for an episode of 25 ticks.",
-            "Effects end with the episode: □[0,17] ◇[0,8] says the same of trajectories of 25 ticks, and is decided with "
-            "them.",
+            "Effects end with the episode: □[0,17] ◇[0,8] says the same of trajectories of 25 ticks, and is decided "
+            "with them.",
         ),
     ),
 )
@@ -114,6 +115,9 @@ def find_study(name: str, *, quick: bool = False, runs: int | None = None, seed:
     Raises:
         ConfigurationError: If there is no such study, or a number is out of range.
     """
+    pair = find_pair(name, seed, runs)
+    if pair is not None:
+        return pair
     if name not in STUDIES:
         raise ConfigurationError(f"there is no study {name!r}; choose {', '.join(STUDIES)}")
     if runs is not None and runs < 1:

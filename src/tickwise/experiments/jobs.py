@@ -117,6 +117,8 @@ def _collect(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcom
     mdp = environment.mdp()
     problem = Problem(mdp, environment.task_table(), tau_memory(mdp, phase.tau))
     settings = spec.learning.settings
+    if phase.epsilon is not None:
+        settings = replace(settings, epsilon=phase.epsilon)
     q = problem.initial_q(settings)
     rng = generator(spec.seed, spec.name, "collect", job.subject, job.run)
     step = max(phase.episodes // 10, 1)

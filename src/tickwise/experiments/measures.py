@@ -131,6 +131,46 @@ def ratio(slow: Sequence[int | None], fast: Sequence[int | None], limit: int) ->
     return {"value": float(numerator / np.mean(there)), "at_least": at_least}
 
 
+def sure_ratio(slow: Sequence[int | None], fast: Sequence[int | None], limit: int) -> float:
+    """How many times fewer episodes the fast method needs, where runs that did not get there count with the limit.
+
+    Args:
+        slow: Episodes of each run of the slow method, None where a run did not get there.
+        fast: Episodes of each run of the fast method, likewise; 0 counts as 1.
+        limit: The most episodes that either method learned for.
+
+    Returns:
+        The ratio of the means.
+    """
+    means = [np.mean([limit if value is None else max(value, 1) for value in values]) for values in (slow, fast)]
+    return float(means[0] / means[1])
+
+
+def median_statistics(values: Sequence[float], seed: int) -> dict[str, Any]:
+    """The median of some ratios and its 95 % bootstrap interval.
+
+    Args:
+        values: The ratios.
+        seed: The seed of the bootstrap.
+
+    Returns:
+        ``median``, ``low`` and ``high``, which are None where there is no ratio; ``count``, how many there are; and
+        ``quartiles``, the lower and the upper one.
+    """
+    numbers = np.asarray(values, dtype=np.float64)
+    if not len(numbers):
+        return {"median": None, "low": None, "high": None, "count": 0, "quartiles": None}
+    low, high = _interval(numbers, np.median, seed)
+    quartiles = [float(value) for value in np.percentile(numbers, [25, 75])]
+    return {
+        "median": float(np.median(numbers)),
+        "low": low,
+        "high": high,
+        "count": len(numbers),
+        "quartiles": quartiles,
+    }
+
+
 def _interquartile_mean(values: NDArray[np.float64], axis: int = -1) -> Any:
     return trim_mean(values, 0.25, axis=axis)
 

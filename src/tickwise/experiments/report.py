@@ -15,7 +15,7 @@ from tickwise.experiments.captions import captions
 from tickwise.experiments.choices import choices, signed
 from tickwise.experiments.regions import NamedFormula, overlap, ranges_text, read_formula
 from tickwise.experiments.study import StudySpec
-from tickwise.experiments.verdict import count, published, verdict
+from tickwise.experiments.verdict import count, headline, published, verdict
 from tickwise.logic.render import to_english, to_unicode
 from tickwise.logic.syntax import Bound, Box
 
@@ -51,6 +51,7 @@ class Part:
         verdict: What was found, in sentences.
         links: Anchors and labels of its sections.
         body: The sections as HTML.
+        headline: The most important of it in one sentence, for the head of a page with several parts.
     """
 
     key: str
@@ -58,6 +59,7 @@ class Part:
     verdict: Sequence[str]
     links: Sequence[tuple[str, str]]
     body: Markup
+    headline: str = ""
 
 
 def render_page(
@@ -75,7 +77,7 @@ def render_page(
     Returns:
         The page. All text from data is escaped; the same input gives the same page.
     """
-    page = _template("page").render(
+    page = template("page").render(
         title=title, verdict=verdict, parts=parts, environment=_environment_rows(environment), seed=seed,
         version=environment["version"], command=environment["command"],
     )  # fmt: skip
@@ -110,7 +112,7 @@ def study_part(
     """
     summary = results["summary"]
     prefix = f"{spec.name}-" if nested else ""
-    body = _template("study").render(
+    body = template("study").render(
         h=3 if nested else 2,
         prefix=prefix,
         spec=spec,
@@ -132,10 +134,10 @@ def study_part(
         command=summary["command"],
     )
     links = [(prefix + name, label) for name, label in _SECTIONS.items()]
-    return Part(spec.name, spec.title, verdict(summary, spec), links, Markup(body))
+    return Part(spec.name, spec.title, verdict(summary, spec), links, Markup(body), headline(summary, spec))
 
 
-def _template(name: str) -> Template:
+def template(name: str) -> Template:
     """A template of this package; it escapes what it is given."""
     environment = Environment(
         loader=PackageLoader("tickwise.experiments"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,

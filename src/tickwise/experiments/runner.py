@@ -138,8 +138,8 @@ def unfinished(spec: StudySpec, store: Store) -> Job | None:
 
 def _preparation(spec: StudySpec) -> list[_Phase]:
     return [
-        ("Collect", _jobs(spec, "collect", ("source", "target"))),
-        ("Infer", _jobs(spec, "infer", ("",))),
+        ("Collect", _jobs("collect", ("source", "target"), spec.inferences)),
+        ("Infer", _jobs("infer", ("",), spec.inferences)),
     ]
 
 
@@ -147,12 +147,12 @@ def _learning(spec: StudySpec, methods: Sequence[str]) -> list[_Phase]:
     """The phases that learn."""
     transfer = "IV" in methods
     learners = [method for method in methods if method != "IV"] + ["source"] * transfer
-    phases = [("Learn", _jobs(spec, "learn", learners))] if learners else []
-    return phases + [("Transfer", _jobs(spec, "learn", ("IV",)))] * transfer
+    phases = [("Learn", _jobs("learn", learners, range(spec.runs)))] if learners else []
+    return phases + [("Transfer", _jobs("learn", ("IV",), range(spec.runs)))] * transfer
 
 
-def _jobs(spec: StudySpec, kind: str, subjects: Sequence[str]) -> list[Job]:
-    return [Job(kind, subject, run) for subject in subjects for run in range(spec.runs)]
+def _jobs(kind: str, subjects: Sequence[str], runs: range) -> list[Job]:
+    return [Job(kind, subject, run) for subject in subjects for run in runs]
 
 
 def _episodes(spec: StudySpec, subject: str) -> int:

@@ -28,6 +28,7 @@ class Collection:
         least_ticks: None gives label 1 to trajectories with a return above 0 (Case Study 1). A number gives it to those
             that last at least so many ticks, and their last state is left out, since the rule may have been broken
             there (Case Study 2).
+        epsilon: Exploration during the phase; None for that of learning. 1 gives trajectories of random actions.
         noise: The share of trajectories whose label is turned round before inference, to see what wrong labels do.
     """
 
@@ -37,6 +38,7 @@ class Collection:
     positives: dict[str, int] = field(default_factory=lambda: {"source": 40, "target": 20})
     most_episodes: int = 200_000
     least_ticks: int | None = None
+    epsilon: float | None = None
     noise: float = 0.0
 
 
@@ -154,6 +156,7 @@ class StudySpec:
         similar: Whether the target task is known to be similar to the source task.
         remarks: What else the study's author chose: what it is about, what the paper says of it, and the choice.
         runs: Independent runs.
+        collections: Collections that formulas are inferred from; None for as many as there are runs.
         seed: The root seed.
         short: Whether it was cut short to be looked at within minutes.
     """
@@ -171,8 +174,14 @@ class StudySpec:
     similar: bool = True
     remarks: tuple[tuple[str, str, str], ...] = ()
     runs: int = 10
+    collections: int | None = None
     seed: int = 0
     short: bool = False
+
+    @property
+    def inferences(self) -> range:
+        """The numbers of the collections that formulas are inferred from."""
+        return range(self.runs if self.collections is None else self.collections)
 
     def as_dict(self) -> dict[str, Any]:
         """The specification as plain data, as it goes into a run folder and a report."""

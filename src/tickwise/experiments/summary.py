@@ -53,8 +53,8 @@ def gather(spec: StudySpec, store: Store, version: str) -> dict[str, Any]:
         StoreError: If one cannot be read.
     """
     runs = range(spec.runs)
-    collections = [{"run": run, **{task: _counts(store, task, run) for task in TASKS}} for run in runs]
-    inferences = [store.load(Job("infer", "", run).name) for run in runs]
+    collections = [{"run": run, **{task: _counts(store, task, run) for task in TASKS}} for run in spec.inferences]
+    inferences = [store.load(Job("infer", "", run).name) for run in spec.inferences]
     values = {task: _values(spec, task) for task in TASKS}
     methods = {
         method: [_run(spec, store, method, run, values["target"]) for run in runs]

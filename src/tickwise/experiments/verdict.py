@@ -36,6 +36,25 @@ def verdict(summary: Mapping[str, Any], spec: StudySpec) -> list[str]:
     return sentences
 
 
+def headline(summary: Mapping[str, Any], spec: StudySpec) -> str:
+    """What a study found, in one sentence.
+
+    Args:
+        summary: The summary of the study.
+        spec: The study.
+    """
+    title = spec.title.split(":")[0]
+    found = []
+    for name in ("III", "IV"):
+        if name in summary["methods"]:
+            mean = summary["methods"][name]["statistics"]["goal"]["mean"]
+            paper = f" (paper: {published(spec, name)})" if spec.published.episodes else ""
+            found.append(f"Method {name} after {count(mean)} episodes{paper}")
+    if not found:
+        return f"{title}: {_transferability(summary)}"
+    return f"{title}: the first {spec.learning.goal.short} came with {' and with '.join(found)}."
+
+
 def _transferability(summary: Mapping[str, Any]) -> str:
     structures = summary["structures"]
     share = f"{structures['transferable']} of {structures['of']} collections"

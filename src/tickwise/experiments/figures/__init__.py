@@ -56,6 +56,25 @@ def draw_figures(results: Mapping[str, Any], spec: StudySpec, folder: Path) -> d
     return drawn
 
 
+def draw_pairs(results: Mapping[str, Any], folder: Path) -> str:
+    """Draw what random pairs of tasks show, as ``pairs.svg`` and ``pairs.png``.
+
+    Args:
+        results: What `tickwise.experiments.pairs.gather_pairs` gave.
+        folder: Where the files go.
+
+    Returns:
+        The SVG text.
+
+    Raises:
+        StoreError: If a file cannot be written.
+    """
+    with _style():
+        from tickwise.experiments.figures import pairs
+
+        return _write(pairs.draw(results), folder / "pairs")
+
+
 def draw_effect(results: Mapping[str, Any], folder: Path) -> dict[str, str]:
     """Draw what a setting does, as ``name.svg`` and ``name.png``, and apart from it the times, as ``name-time``.
 

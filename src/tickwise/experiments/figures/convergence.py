@@ -35,7 +35,7 @@ def draw_boxplot(results: Mapping[str, Any], spec: StudySpec) -> Figure | None:
             medianprops={"color": look.colour, "linewidth": 2.6},
         )  # fmt: skip
         axes.scatter(
-            place + _spread(len(means), 0.3), means, s=30, marker=look.marker, color=look.colour, alpha=0.75,
+            place + spread(len(means), 0.3), means, s=30, marker=look.marker, color=look.colour, alpha=0.75,
             edgecolors="white", linewidths=0.5, zorder=4,
         )  # fmt: skip
     v_star = results["summary"]["v_star"]
@@ -100,7 +100,7 @@ def _present(results: Mapping[str, Any]) -> dict[str, Any]:
     return {name: results["methods"][name] for name in METHODS if results["methods"].get(name)}
 
 
-def _spread(count: int, width: float) -> NDArray[np.float64]:
+def spread(count: int, width: float) -> NDArray[np.float64]:
     """Offsets that keep points apart, the same each time."""
     return np.asarray((np.arange(count) * 0.618034 % 1 - 0.5) * width, dtype=np.float64)
 
@@ -109,7 +109,7 @@ def _runs(axes: Axes, place: int, name: str, values: Sequence[int | None], limit
     look = METHODS[name]
     there = np.array([max(value, 1) for value in values if value is not None], dtype=np.float64)
     axes.scatter(
-        there, place + 0.1 + _spread(len(there), 0.34), s=30, marker=look.marker, color=look.colour,
+        there, place + 0.1 + spread(len(there), 0.34), s=30, marker=look.marker, color=look.colour,
         alpha=0.75, edgecolors="white", linewidths=0.5, zorder=4,
     )  # fmt: skip
     missing = len(values) - len(there)
