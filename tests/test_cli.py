@@ -19,6 +19,7 @@ import pytest
 from typer.testing import CliRunner
 
 import tests
+from tests.experiments.tiny_suite import in_place
 from tickwise import cli
 from tickwise.cli import app, main
 
@@ -164,6 +165,29 @@ def test_an_unknown_study_names_those_there_are(tickwise: Tickwise, tmp_path: Pa
     line = tickwise.fails("reproduce", "case7", "--out", tmp_path / "run")
     assert line.startswith("there is no study 'case7'; choose case1")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_tasks_belong_to_suites(tickwise: Tickwise, tmp_path: Path):
+    line = tickwise.fails("reproduce", "case1", "--tasks", 3, "--out", tmp_path / "run")
+    assert line == "case1 has no random tasks; leave --tasks out, or reproduce random or all"
+    assert "'--tasks'" in tickwise.fails("reproduce", "random", "--tasks", 0, "--out", tmp_path / "run", status=2)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_suite_is_reproduced_shown_and_rendered_again(tickwise: Tickwise, tmp_path: Path):
+    folder = tmp_path / "all"
+    with in_place():
+        first = tickwise("reproduce", "all", "--tasks", 2, "--runs", 1, "--out", folder, "--workers", 1)
+        assert first.status == 0
+        lines = first.out.splitlines()
+        assert lines[0] == "== tiny"
+        assert "similar pairs identified: 1 of 1" in lines
+        assert "dissimilar pairs refused: 1 of 1" in lines
+        assert lines[-1] == f"report: {folder / 'report.html'}"
+        again = tickwise("report", folder)
+        assert (again.status, again.out, again.err) == (0, first.out, "")
+        line = tickwise.fails("reproduce", "all", "--tasks", 3, "--runs", 1, "--out", folder)
+    assert "holds a run of another configuration (its tasks is 2, not 3)" in line
 
 
 def test_an_unknown_effect_names_those_there_are(tickwise: Tickwise, tmp_path: Path):
