@@ -12,6 +12,11 @@ from tickwise.experiments.choices import signed
 from tickwise.experiments.effects import Effect
 from tickwise.experiments.report import Part, inline_svg, template
 
+_POINTS = "A point is a collection; the line goes through the medians, and the range is shaded."
+
+_CLEARLY = 0.1
+"""The share of its range by which a measure must go beyond its ends for a sentence to say so."""
+
 
 def effect_part(effect: Effect, results: Mapping[str, Any], figures: Mapping[str, str], *, nested: bool = True) -> Part:
     """What a setting does.
@@ -35,7 +40,7 @@ def effect_part(effect: Effect, results: Mapping[str, Any], figures: Mapping[str
         runs=summary["runs"],
         own=_value(summary["own"]),
         command=summary["command"],
-        figures=[_figure(effect, name, svg) for name, svg in figures.items()],
+        figures=[_figure(effect, results, name, svg) for name, svg in figures.items()],
         values=[_value(value) for value in summary["values"]],
         rows=[_row(measure) for group in (summary, times) for measure in group["measures"].values()],
     )
@@ -78,28 +83,37 @@ def _trend(symbol: str, values: Sequence[float], measured: Mapping[str, Any]) ->
     none = f" (none at {symbol} = {', '.join(missing)})" if missing else ""
     if len(set(texts)) == 1:
         return f"stays at {texts[0]}{unit}{none}"
-    first, last = known[0][1], known[-1][1]
-    extremes = [place for place, (_, middle) in enumerate(known) if not min(first, last) <= middle <= max(first, last)]
-    if extremes:  # the one that is furthest out
-        place = max(
-            extremes, key=lambda place: max(known[place][1] - max(first, last), min(first, last) - known[place][1])
-        )
+    middles = [middle for _, middle in known]
+    first, last = middles[0], middles[-1]
+    beyond = [max(middle - max(first, last), min(first, last) - middle) for middle in middles]
+    place = beyond.index(max(beyond))
+    if beyond[place] > _CLEARLY * (max(middles) - min(middles)):
         at = f"{texts[place]}{unit} at {symbol} = {_value(known[place][0])}"
         return f"goes from {texts[0]}{unit} over {at} to {texts[-1]}{unit}{none}"
     return f"{'rises' if last > first else 'falls'} from {texts[0]}{unit} to {texts[-1]}{unit}{none}"
 
 
-def _figure(effect: Effect, name: str, svg: str) -> dict[str, Any]:
+def _figure(effect: Effect, results: Mapping[str, Any], name: str, svg: str) -> dict[str, Any]:
     timed = name.endswith("-time")
-    what = "processor time of inference in one process, without compilation" if timed else "what is measured"
     return {
         "name": f"effect-{name}-figure",
-        "title": "Time" if timed else "Effect",
+        "title": "Time of inference" if timed else "Effect",
         "counterpart": "",
-        "caption": f"{effect.axis[:1].upper()}{effect.axis[1:]}: {what}. A point is a collection, the line goes "
-        "through the medians, and the range is shaded; bars are shares of the collections.",
+        "caption": _time_caption(results) if timed else _caption(effect, results),
         "svg": inline_svg(f"effect-{name}-figure", svg),
     }
+
+
+def _caption(effect: Effect, results: Mapping[str, Any]) -> str:
+    shares = any(measure["share"] for measure in results["summary"]["measures"].values())
+    bars = " A bar is the share of the collections." if shares else ""
+    return f"Over the {effect.axis}. {_POINTS}{bars} Values stand at equal distances."
+
+
+def _time_caption(results: Mapping[str, Any]) -> str:
+    line = " Axes are logarithmic; the dashed curve is linear growth, fitted from the study’s own value on."
+    size = "size" in results["times"]
+    return f"Processor time of one process, without compilation. {_POINTS}{line if size else ''}"
 
 
 def _row(measure: Mapping[str, Any]) -> dict[str, Any]:
