@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow lint types bench lock clean
+.PHONY: help demo test test-slow lint types bench kills lock clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' $(MAKEFILE_LIST) | expand -t 14
@@ -30,6 +30,9 @@ types: $(VENV)/.development ## check the types
 
 bench: $(VENV)/.runtime ## compare the learning loop with C
 	$(BIN)/python benchmarks/learning.py
+
+kills: $(VENV)/.runtime ## kill a reproduction a hundred times, and compare with one left alone
+	$(BIN)/python benchmarks/kills.py
 
 # The stamps say that an environment holds what a lock file names.
 $(VENV)/.created:
