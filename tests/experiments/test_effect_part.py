@@ -78,7 +78,9 @@ def test_what_could_not_be_measured_is_said(results: dict[str, Any]):
     results["summary"]["measures"]["structure"]["middle"] = [0.9, 0.5, 0.1]
     assert effect_verdict(EFFECT, results)[0].endswith("with the true structure falls from 0.90 to 0.10.")
     results["summary"]["measures"]["structure"]["middle"] = [0.1, 0.95, 0.9]  # hardly more in between
-    assert effect_verdict(EFFECT, results)[0].endswith("with the true structure rises from 0.10 to 0.90.")
+    assert effect_verdict(EFFECT, results)[0].endswith(
+        "with the true structure rises from 0.10 to 0.90, nearly all of it by N⁻ = 200."
+    )
 
 
 def test_the_page_of_one_effect(results: dict[str, Any], tmp_path: Path):

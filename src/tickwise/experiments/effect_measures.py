@@ -193,10 +193,10 @@ TARGET_GAIN = Measure("target_gain", "Information gain of φᵀ", "nats a tick",
 TARGET_OVERLAP = Measure(
     "target_overlap", "Overlap of the regions of φᵀ with the true ones", "share of the area", ".2f", _overlap("target")
 )
-DISJUNCTS = Measure("disjuncts", "Number of disjuncts of φᵀ", "copies of the source’s structure", ".0f", _disjuncts)
+DISJUNCTS = Measure("disjuncts", "Number of disjuncts of φᵀ", "copies of the structure", ".0f", _disjuncts)
 TRANSFERABLE = Measure(
     "transferable",
-    "Share with transferability identified",
+    "Share found transferable",
     "share of the collections",
     ".2f",
     _transferable,
@@ -204,7 +204,7 @@ TRANSFERABLE = Measure(
 )
 SOURCE_POSITIVES, TARGET_POSITIVES = (
     Measure(
-        f"{task}_positives", f"Number of positive trajectories of the {task}", "of 1,000 episodes", ".0f",
+        f"{task}_positives", f"Number of positives in the {task}", "of 1,000 episodes", ".0f",
         _positives(task),
     )
     for task in ("source", "target")

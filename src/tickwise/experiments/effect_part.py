@@ -90,7 +90,9 @@ def _trend(symbol: str, values: Sequence[float], measured: Mapping[str, Any]) ->
     if beyond[place] > _CLEARLY * (max(middles) - min(middles)):
         at = f"{texts[place]}{unit} at {symbol} = {_value(known[place][0])}"
         return f"goes from {texts[0]}{unit} over {at} to {texts[-1]}{unit}{none}"
-    return f"{'rises' if last > first else 'falls'} from {texts[0]}{unit} to {texts[-1]}{unit}{none}"
+    there = next(place for place, middle in enumerate(middles) if abs(middle - first) >= 0.9 * abs(last - first))
+    early = f", nearly all of it by {symbol} = {_value(known[there][0])}" if there < len(known) - 1 else ""
+    return f"{'rises' if last > first else 'falls'} from {texts[0]}{unit} to {texts[-1]}{unit}{early}{none}"
 
 
 def _figure(effect: Effect, results: Mapping[str, Any], name: str, svg: str) -> dict[str, Any]:

@@ -21,6 +21,7 @@ _ROW = 2.75  # inches, as all lengths here
 _FOOT = 0.36
 _LEFT, _BELOW, _ABOVE, _BETWEEN = 0.72, 0.55, 0.5, 0.88
 _CHARACTER = 0.083
+_FAR = 1.5  # ranges of the numbers
 _SYMBOLS = {
     "φˢ": r"$\varphi^{\mathrm{S}}$", "φᵀ": r"$\varphi^{\mathrm{T}}$", "hₘₐₓ": r"$h_{\mathrm{max}}$",
     "ϱₜₕ": r"$\varrho_{\mathrm{th}}$", "V*": "$V^*$", "N⁻": "$N^{-}$", "source, N": "source, $N$",
@@ -91,17 +92,17 @@ def _over_values(axes: Axes, summary: Data, measure: Data, colour: str) -> None:
         _runs(axes, [[place] * len(row) for place, row in zip(places, measure["runs"], strict=True)], measure, colour)
         _middle(axes, places, measure, colour)
     for place in places[np.isnan(middle)]:
-        axes.annotate("none", (place, 0.03), xycoords=("data", "axes fraction"), ha="center", color=MUTED, fontsize=8.5)
+        axes.annotate("none", (place, 0.5), xycoords=("data", "axes fraction"), ha="center", color=MUTED, fontsize=8.5)
     if summary["own"] in values:
         own = values.index(summary["own"])
         axes.axvline(own, color=MUTED, linewidth=1.3, linestyle=(0, (1.2, 2.2)), zorder=0)
-    _mark(axes, measure["mark"])
+    _mark(axes, measure)
     axes.set_xlim(-0.5, len(values) - 0.5)
     axes.xaxis.set_major_locator(FixedLocator(places.tolist()))
     axes.set_xticklabels([tick(value) for value in values], fontsize=8.5)
     whole, seconds = measure["form"] == ".0f", measure["unit"] == "seconds"
     if whole or seconds:  # counted from nothing
-        axes.yaxis.set_major_locator(MaxNLocator(5, integer=whole))
+        axes.yaxis.set_major_locator(MaxNLocator(5, integer=whole, steps=[1, 2, 5, 10]))
         axes.set_ylim(0, 1.06 * max(1.0, axes.get_ylim()[1]))
     _words(axes, measure, summary["axis"])
 
@@ -147,9 +148,13 @@ def _middle(axes: Axes, places: NDArray[np.float64], measure: Data, colour: str)
     axes.plot(places, _numbers(measure["middle"]), color=colour, linewidth=1.9, marker="_", markersize=9, zorder=3)
 
 
-def _mark(axes: Axes, mark: Data | None) -> None:
-    """What to compare with, and room for its name."""
-    if mark is None:
+def _mark(axes: Axes, measure: Data) -> None:
+    """What to compare with, and room for its name; left out where it is so far away that it would flatten the rest."""
+    mark, known = measure["mark"], [value for row in measure["runs"] for value in row if value is not None]
+    if mark is None or not known:
+        return
+    bottom, top = 0 if measure["form"] == ".0f" else min(known), max(known)
+    if not bottom - _FAR * (top - bottom) <= mark["value"] <= top + _FAR * (top - bottom):
         return
     axes.axhline(mark["value"], color=GREEN, linewidth=1.3, linestyle=(0, (5, 2)), zorder=1)
     axes.annotate(
