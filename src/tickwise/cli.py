@@ -171,8 +171,7 @@ def reproduce(
     with _resumable(folder):
         store = run_study(spec, folder, count, Display(messages))
         summary = publish(spec, store, count, time.monotonic() - began)
-    _show_summary(summary)
-    output.print(f"report: {folder / 'report.html'}")
+    _show(summary, folder)
 
 
 def _carry_out(suite: Suite, folder: Path, workers: int | None) -> None:
@@ -186,9 +185,10 @@ def _carry_out(suite: Suite, folder: Path, workers: int | None) -> None:
     began = time.monotonic()
     with _resumable(folder):
         Store.open(folder, suite.as_dict())
-        stores = run_units(suite.units(folder).all, count, Display(messages))
-        summary = publish_suite(suite, folder, stores, count, time.monotonic() - began)
-    _show_suite(summary, folder)
+        units = suite.units(folder)
+        stores = run_units(units.all, count, Display(messages))
+        summary = publish_suite(suite, folder, units, stores, count, time.monotonic() - began)
+    _show(summary, folder)
 
 
 @contextmanager
@@ -202,75 +202,14 @@ def _resumable(folder: Path) -> Iterator[None]:
         ) from None
 
 
-def _show_suite(summary: Mapping[str, Any], folder: Path) -> None:
-    from tickwise.experiments.store import read_json
+def _show(summary: Mapping[str, Any], folder: Path) -> None:
+    """What a run folder shows, and where its report is."""
+    from tickwise.experiments.tables import study_tables, suite_tables
 
-    for name, study in summary["studies"].items():
-        output.print(f"== {name}")
-        _show_summary(study)
-    if "random" in summary:
-        _show_pairs(summary["random"])
-    for name, effect in summary["effects"].items():
-        _show_effect(name, effect, read_json(folder / "times" / f"{name}.json"))
+    tables = suite_tables(summary, folder) if "suite" in summary else study_tables(summary)
+    for table in tables:
+        output.print(table)
     output.print(f"report: {folder / 'report.html'}")
-
-
-def _show_pairs(found: Mapping[str, Any]) -> None:
-    output.print("== random pairs of tasks")
-    for kind, verb in (("similar", "identified"), ("dissimilar", "refused")):
-        row = found["identification"][kind]
-        output.print(f"{kind} pairs {verb}: {row['right']} of {row['of']}")
-    for pair, measures in found["speed_ups"].items():
-        goal = measures["goal"]
-        if goal["median"] is not None:
-            interval = f"[{goal['low']:.1f}, {goal['high']:.1f}]"
-            output.print(f"{pair} by the goal: median {goal['median']:.1f} {interval} over {goal['count']} pairs")
-
-
-def _show_effect(name: str, effect: Mapping[str, Any], times: Mapping[str, Any]) -> None:
-    """A column a value, since there are more measures than fit side by side."""
-    table = Table(title=f"{name}, on {effect['study']}: medians, and shares of the collections", title_justify="left")
-    table.add_column(f"at {effect['symbol']} =")
-    for value in effect["values"]:
-        table.add_column(f"{value:g}", justify="right")
-    for measure in (*effect["measures"].values(), *times["measures"].values()):
-        cells = ("none" if middle is None else format(middle, measure["form"]) for middle in measure["middle"])
-        unit = ", seconds" if measure["unit"] == "seconds" else ""
-        table.add_row(measure["title"] + unit, *cells)
-    output.print(table)
-
-
-def _show_summary(summary: Mapping[str, Any]) -> None:
-    for name, formula in summary["formulas"].items():
-        output.print(f"{name.replace('_', ' ')}: {formula or 'none'}")
-    output.print(f"logically transferable: {'yes' if summary['transferable'] else 'no'}")
-    output.print(f"reason: {summary['reason']}")
-    runs = summary["runs"]
-    table = Table(
-        title=f"Episodes to converge, mean of {runs} run{'' if runs == 1 else 's'} (V* = {summary['v_star']:.2f})\n"
-        f"goal: {summary['goal']}",
-        title_justify="left",
-    )
-    columns = {"goal": "goal", "reached_80": "80 %", "reached_90": "90 %", "reached_95": "95 %", "settled": "settled"}
-    table.add_column("method")
-    for heading in (*columns.values(), "mean return"):
-        table.add_column(heading, justify="right")
-    for name, method in summary["methods"].items():
-        statistics = method["statistics"]
-        cells = [_episodes(statistics[key], runs) for key in columns]
-        table.add_row(name, *cells, f"{statistics['window_mean']['iqm']:.1f}")
-    output.print(table)
-    for pair, measures in summary["ratios"].items():
-        found = measures["goal"]
-        if found["value"] is not None:
-            least = "at least " if found["at_least"] else ""
-            output.print(f"{pair} by the goal: {least}{found['value']:.1f} times fewer episodes")
-
-
-def _episodes(statistics: Mapping[str, Any], runs: int) -> str:
-    if statistics["mean"] is not None:
-        return f"{statistics['mean']:,.0f}"
-    return f"{statistics['reached']} of {runs} runs"
 
 
 @app.command()
@@ -281,9 +220,7 @@ def infer(
     rate: Annotated[float, typer.Option(help="The least classification rate, ζ.")] = 0.95,
     information_weight: Annotated[float, typer.Option(min=0, help="The weight of the information gain, λ.")] = 0.01,
     depth: Annotated[int, typer.Option(min=1, help="The depth of the decision tree, h_max.")] = 2,
-    class_weight: Annotated[
-        str | None, typer.Option(help="'balanced' lets both labels count the same, however many there are of each.")
-    ] = None,
+    class_weight: Annotated[str | None, typer.Option(help="'balanced' lets both labels count the same.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="The seed of the search.")] = 0,
     as_json: JsonFlag = False,
 ) -> None:
@@ -437,21 +374,13 @@ def report(
     """
     from tickwise.experiments.publish import republish
 
-    summary = republish(folder)
-    if "suite" in summary:
-        _show_suite(summary, folder)
-        return
-    _show_summary(summary)
-    output.print(f"report: {folder / 'report.html'}")
+    _show(republish(folder), folder)
 
 
 @app.command()
 @_command
 def effect(
-    name: Annotated[
-        str,
-        typer.Argument(help="The setting: trajectories, depth, noisy-depth, information-weight, rate, or tau."),
-    ],
+    name: Annotated[str, typer.Argument(help="The setting, such as rate or tau; another word lists them all.")],
     study: Annotated[str | None, typer.Option(help="The study that it is measured on (the telling one).")] = None,
     runs: Annotated[int | None, typer.Option(min=1, help="Collections a value (3; 1 with --quick).")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few values.")] = False,

@@ -34,8 +34,9 @@ def small() -> Iterator[None]:
 
 def carry_out(suite: Suite, folder: Path) -> dict:
     Store.open(folder, suite.as_dict())
-    stores = run_units(suite.units(folder).all, 1, Display(Console(file=io.StringIO())))
-    return publish_suite(suite, folder, stores, 1, 1.0)
+    units = suite.units(folder)
+    stores = run_units(units.all, 1, Display(Console(file=io.StringIO())))
+    return publish_suite(suite, folder, units, stores, 1, 1.0)
 
 
 @pytest.fixture(scope="module")

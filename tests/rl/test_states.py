@@ -22,7 +22,17 @@ from tickwise.errors import ConfigurationError, DataError
 from tickwise.logic.parse import parse
 from tickwise.logic.semantics import verdict
 from tickwise.rl.qlearning import Problem, QSettings, collect
-from tickwise.rl.states import Memory, automaton_memory, nearest_centroid, state_letters, tau_memory
+from tickwise.rl.states import (
+    DISJUNCT_CHOICES,
+    Memory,
+    automaton_memory,
+    disjunct_choice,
+    first_disjunct,
+    nearest_centroid,
+    nearest_region,
+    state_letters,
+    tau_memory,
+)
 
 SOURCE_1 = "F[1,15] G[0,4] (3 <= x <= 4 & 3 <= y <= 5) & F[21,39] (7 <= x <= 8 & 5 <= y <= 8)"
 TARGET_1 = "F[5,18] G[0,5] (5 <= x <= 6 & 6 <= y <= 7) & F[24,39] (4 <= x <= 7 & 1 <= y <= 2)"
@@ -204,6 +214,27 @@ def test_another_choice_of_the_disjunct():
     mdp, tables = CASE_STUDY_2_TARGET.mdp(), tables_of(TARGET_2)
     memory = automaton_memory(mdp, tables, lambda mdp, _: np.full(mdp.n_states, 1, dtype=np.int32))
     assert (memory.start >= memory.offsets[1]).all()
+
+
+def test_the_nearest_region_and_its_ties():
+    mdp = GridWorld(6).mdp()
+    # a wide region from x = 0 to 4 and a narrow one from 5 to 6: at x = 3.5 the wide one is here, its centroid farther
+    tables = tables_of("(F[0,3] (0 <= x <= 4)) | (F[0,3] (5 <= x <= 6))")
+    column = mdp.coordinates[:, 0]
+    np.testing.assert_array_equal(nearest_centroid(mdp, tables)[column == 3.5][0], 0)  # 1.5 against 2
+    np.testing.assert_array_equal(nearest_region(mdp, tables), np.where(column > 4, 1, 0))  # a tie at 4.5
+    assert nearest_centroid(mdp, tables)[column == 4.5][0] == 1
+    wide = tables_of("(F[0,3] (0 <= x <= 5)) | (F[0,3] (4 <= x <= 6))")  # both regions hold 4.5: the nearer centroid
+    assert nearest_region(mdp, wide)[column == 4.5][0] == 1
+    assert nearest_region(mdp, wide)[column == 3.5][0] == 0
+    assert not first_disjunct(mdp, tables).any()
+
+
+def test_choices_go_by_name():
+    assert disjunct_choice("nearest_centroid") is nearest_centroid
+    assert list(DISJUNCT_CHOICES) == ["nearest_centroid", "nearest_region", "first_disjunct"]
+    with pytest.raises(ConfigurationError, match="no choice of the disjunct 'best'; use nearest_centroid, "):
+        disjunct_choice("best")
 
 
 def test_state_letters_by_hand():

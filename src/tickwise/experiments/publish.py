@@ -50,13 +50,16 @@ def publish(spec: StudySpec, store: Store, workers: int, seconds: float) -> dict
     return _publish_study(spec, store, environment)
 
 
-def publish_suite(suite: Suite, folder: Path, stores: Sequence[Store], workers: int, seconds: float) -> dict[str, Any]:
+def publish_suite(
+    suite: Suite, folder: Path, units: Units, stores: Sequence[Store], workers: int, seconds: float
+) -> dict[str, Any]:
     """Write the summary, the figures and the report of a finished suite, and those of each of its studies.
 
     Args:
         suite: The suite.
         folder: Its run folder.
-        stores: The artefacts of each of its units.
+        units: All that belongs to it.
+        stores: The artefacts of each of them.
         workers: Processes that worked at the same time.
         seconds: How long this call worked; earlier calls that finished in the same folder are added.
 
@@ -66,7 +69,6 @@ def publish_suite(suite: Suite, folder: Path, stores: Sequence[Store], workers: 
     Raises:
         StoreError: If a file cannot be read or written.
     """
-    units = suite.units(folder)
     environment = _environment(suite.command, folder, units.all, stores, workers, seconds)
     return _publish_suite(suite, folder, units, stores, environment)
 
