@@ -69,7 +69,7 @@ def pairs_verdict(results: Mapping[str, Any]) -> list[str]:
         if found[kind]["of"]
     ]
     sentences = [f"On random pairs of tasks, transferability was {' and '.join(parts)}."]
-    for pair, text in (("I/III", "the formula saves a factor of"), ("III/IV", "the transfer a further")):
+    for pair, text in (("I/III", "the formula saves a factor of"), ("III/IV", "the transfer saves a further")):
         median = results["speed_ups"][pair]["goal"]
         if median["median"] is not None:
             sentences.append(
