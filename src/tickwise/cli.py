@@ -139,7 +139,7 @@ def _options(
 @app.command()
 @_command
 def reproduce(
-    study: Annotated[str, typer.Argument(help="What: case1, case2, random (pairs of tasks), or all.")],
+    study: Annotated[str, typer.Argument(help="What: case1, case2, random (pairs of tasks), pair-07 (one), or all.")],
     runs: Annotated[int | None, typer.Option(min=1, help="Independent runs (10; 3 with --quick).")] = None,
     tasks: Annotated[int | None, typer.Option(min=1, help="Random pairs of tasks (50; 4 with --quick).")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, episodes and tasks.")] = False,
@@ -151,7 +151,7 @@ def reproduce(
 
     For example: tickwise reproduce case1 --quick --out runs/look
     """
-    from tickwise.experiments.case_studies import STUDIES, find_study
+    from tickwise.experiments.case_studies import find_study
     from tickwise.experiments.progress import Display
     from tickwise.experiments.publish import publish
     from tickwise.experiments.runner import default_workers, run_study
@@ -161,11 +161,9 @@ def reproduce(
     if study in ("random", "all"):
         _carry_out(find_suite(study, tasks=tasks, runs=runs, seed=seed, quick=quick), folder, workers)
         return
-    if study not in STUDIES:
-        raise ConfigurationError(f"there is no study {study!r}; choose {', '.join(STUDIES)}, random or all")
+    spec = find_study(study, quick=quick, runs=runs, seed=seed)
     if tasks is not None:
         raise ConfigurationError(f"{study} has no random tasks; leave --tasks out, or reproduce random or all")
-    spec = find_study(study, quick=quick, runs=runs, seed=seed)
     count = workers or default_workers()
     began = time.monotonic()
     with _resumable(folder):

@@ -16,6 +16,7 @@ from tickwise.experiments.case_studies import CASE_STUDY_1
 from tickwise.experiments.choices import choices
 from tickwise.experiments.figures import FIGURES
 from tickwise.experiments.report import inline_svg, render_report, settings_tree
+from tickwise.experiments.study import Published
 from tickwise.experiments.verdict import verdict
 
 SPEC = synthetic.small()
@@ -237,3 +238,22 @@ def test_an_inline_figure_keeps_its_references_apart_from_others():
     assert "url(#maps-c)" in svg
     assert "width=" not in svg
     assert "<!--" not in svg
+
+
+def test_a_study_of_ones_own_is_not_compared_with_the_paper():
+    spec = replace(
+        SPEC,
+        published=Published(),
+        remarks=(
+            (
+                "Rule",
+                "None.",
+                "Ours & theirs <b>.",
+            ),
+        ),
+    )
+    page = render_report(synthetic.results(spec), spec, {})
+    assert "Counterpart in the paper" not in page
+    assert "13,850" not in page
+    assert '<th scope="col">Paper</th>' not in page
+    assert "Ours &amp; theirs &lt;b&gt;." in page

@@ -119,7 +119,9 @@ def find_study(name: str, *, quick: bool = False, runs: int | None = None, seed:
     if pair is not None:
         return pair
     if name not in STUDIES:
-        raise ConfigurationError(f"there is no study {name!r}; choose {', '.join(STUDIES)}")
+        raise ConfigurationError(
+            f"there is no study {name!r}; choose {', '.join(STUDIES)}, or a random pair such as pair-07"
+        )
     if runs is not None and runs < 1:
         raise ConfigurationError(f"a study of {runs} runs shows nothing; use --runs 1 or more")
     if seed < 0:
