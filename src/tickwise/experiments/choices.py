@@ -116,6 +116,11 @@ def _exploration(settings: QSettings) -> str:
     return f"A random action with probability ε = {settings.epsilon:g}"
 
 
+def capital(text: str) -> str:
+    """A text with a capital first letter; the rest stays as it is."""
+    return text[:1].upper() + text[1:]
+
+
 def signed(value: float, form: str = "g") -> str:
     """A number with a proper minus sign."""
     return format(value, form).replace("-", "−")
@@ -158,6 +163,12 @@ def _inference(spec: StudySpec) -> tuple[Choice, ...]:
             "ten-thousandths of J, which a few dozen trajectories cannot tell apart.",
         ),
         Choice(
+            "Formula of the source task",
+            "That of the decision tree, if it is satisfying.",
+            "Less the disjuncts that it is satisfying without. Where it is not satisfying, the operators of the tree's "
+            "formula are kept and all parameters optimised together, as in the target.",
+        ),
+        Choice(
             "Negated primitives",
             "A primitive may be the negation of a structure.",
             "Kept as primitives by duality: ¬◇ρ is □¬ρ. Where all leaves below a node have label 1, its path formula "
@@ -174,6 +185,11 @@ def _inference(spec: StudySpec) -> tuple[Choice, ...]:
 
 def _transfer(spec: StudySpec) -> tuple[Choice, ...]:
     return (
+        Choice(
+            "The disjunct of an episode",
+            "Some heuristic criterion, for example the nearest centroid of the first predicate's region.",
+            f"{capital(spec.learning.disjunct.replace('_', ' '))}, ties to the first. The strategy can be replaced.",
+        ),
         Choice(
             "Ties in Algorithm 2, line 6",
             "The source state with the most similar relative position; several may be equally similar.",

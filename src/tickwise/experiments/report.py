@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.experiments.captions import captions
-from tickwise.experiments.choices import choices, signed
+from tickwise.experiments.choices import capital, choices, signed
 from tickwise.experiments.regions import NamedFormula, overlap, ranges_text, read_formula
 from tickwise.experiments.study import StudySpec
 from tickwise.experiments.verdict import count, headline, published, verdict
@@ -123,7 +123,7 @@ def study_part(
         staying=[_method_row(name, summary, spec, "stays") for name in _METHODS],
         ratios=_ratio_rows(summary, spec),
         goal=spec.learning.goal.text,
-        heading=_capital(spec.learning.goal.heading),
+        heading=capital(spec.learning.goal.heading),
         reason=_sentence(summary["reason"]),
         fail=signed(summary["fail"]),
         collections=results["collections"],
@@ -183,11 +183,7 @@ def settings_tree(value: Any) -> Any:
 def _sentence(reason: str) -> str:
     """A reason as a sentence of its own, after the answer that it is the reason of."""
     text = reason.removeprefix("Logical transferability is not identified: ")
-    return _capital(text) + ("" if text.endswith(".") else ".")
-
-
-def _capital(text: str) -> str:
-    return text[:1].upper() + text[1:]
+    return capital(text) + ("" if text.endswith(".") else ".")
 
 
 def _figures(spec: StudySpec, figures: Mapping[str, str], prefix: str) -> dict[str, dict[str, Any]]:
