@@ -11,7 +11,6 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
@@ -186,14 +185,12 @@ def _phase(name: str, pieces: Sequence[_Piece], pool: ProcessPoolExecutor | None
         return
     items = [Item(piece.title, piece.job.unit, piece.weight) for piece in left]
     with board(len(left)) as shared, display.phase(name, items, shared, len(pieces) - len(left)) as finish:
-        tasks = [
-            (os.getpid(), index, piece.job, piece.unit.spec, piece.store, shared) for index, piece in enumerate(left)
-        ]
+        tasks = [(index, piece.job, piece.unit.spec, piece.store, shared) for index, piece in enumerate(left)]
         for index in _results(pool, tasks):
             finish(index)
 
 
-_Task = tuple[int, int, Job, StudySpec, Store, Board]
+_Task = tuple[int, Job, StudySpec, Store, Board]
 
 
 def _results(pool: ProcessPoolExecutor | None, tasks: Sequence[_Task]) -> Iterator[int]:
@@ -227,7 +224,9 @@ def _pool(workers: int) -> Iterator[ProcessPoolExecutor | None]:
         if workers == 1:
             yield None
             return
-        pool = ProcessPoolExecutor(workers, mp_context=get_context("spawn"))
+        pool = ProcessPoolExecutor(
+            workers, mp_context=get_context("spawn"), initializer=_end_with, initargs=(os.getpid(),)
+        )
         try:
             yield pool
         except BaseException:
@@ -259,17 +258,14 @@ def _on_signal(action: Callable[[int, Any], None] | signal.Handlers, *numbers: i
             signal.signal(number, handler)
 
 
-def _work(parent: int, index: int, job: Job, spec: StudySpec, store: Store, shared: Board) -> int:
+def _work(index: int, job: Job, spec: StudySpec, store: Store, shared: Board) -> int:
     """Do a job; its index comes back."""
-    if os.getpid() != parent:
-        _end_with(parent)
     perform(job, spec, store, shared.reporter(index))
     return index
 
 
-@cache
 def _end_with(parent: int) -> None:
-    """Let this worker end soon after the process that started it, even if that was killed."""
+    """Let this worker end soon after the process that started it, even if that was killed, and before any work came."""
 
     def watch() -> None:
         while os.getppid() == parent:
