@@ -189,7 +189,6 @@ TARGET_RATE = Measure(
     "target_rate", "Classification rate of φᵀ", "share of the trajectories", ".3f", _fact("target", "rate"),
     mark=lambda spec: ("ζ", spec.inference.rate),
 )  # fmt: skip
-TARGET_GAIN = Measure("target_gain", "Information gain of φᵀ", "nats a tick", ".4f", _fact("target", "gain"))
 TARGET_OVERLAP = Measure(
     "target_overlap", "Overlap of the regions of φᵀ with the true ones", "share of the area", ".2f", _overlap("target")
 )
