@@ -10,6 +10,11 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.cpython.unsafe.numbers import trailing_zeros as _trailing_zeros
+
+__all__ = ["njit", "trailing_zeros"]
+
+trailing_zeros: Any = _trailing_zeros  # how many bits below the lowest set one; in compiled code only
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -1,0 +1,39 @@
+"""Upper bounds on what the boxes of many nodes are worth, by threads side by side."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.inference.boxes import Node
+from tickwise.inference.levels import Coded
+from tickwise.inference.gains import GainBound
+from tickwise.inference.scan import Worth, bound_all
+from tickwise.inference.space import Gaps
+
+
+class Bounds:
+    """`scan.bound` of many nodes, by threads side by side."""
+
+    def __init__(self, coded: Coded, free: Gaps, worth: Worth, prior: GainBound, threads: int) -> None:
+        gaps = np.array(free, dtype=np.int64).reshape(-1, 2)
+        self.arguments = (gaps, worth, prior, int((gaps[:, 1] - gaps[:, 0]).max()) + 1)
+        self._coded, self._threads = coded, threads
+        self._pool = ThreadPoolExecutor(threads)
+
+    def __enter__(self) -> Bounds:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def __call__(self, nodes: list[Node]) -> list[float]:
+        """The bound of each node, in units of J."""
+        parts = [np.array(nodes[k :: self._threads]) for k in range(self._threads) if nodes[k :: self._threads]]
+        found = np.empty(len(nodes))
+        run = self._pool.map(lambda part: bound_all(self._coded, part, *self.arguments), parts)
+        for k, bounds in enumerate(run):
+            found[k :: self._threads] = bounds
+        return found.tolist()

@@ -1,0 +1,384 @@
+"""Exact search of a primitive: the greatest J over all boxes, windows and durations in Υ_z, proved by branch and bound.
+
+A node of the search is a range of boxes of one polarity under ◇ and ◇□ or under □ and □◇; `scan.bound` bounds J over
+all of it, windows and durations included. The node with the greatest bound is split until a single box is on top. Its
+windows and durations that can still win get their information gain exactly. The search ends when the best primitive
+found is worth at least every bound left: it is then proved to be the best.
+
+Of primitives of equal J (to 12 decimals) the first wins by: the fewest closed sides of continuous variables; the plain
+box before its complement; the tightest predicate, variable by variable; ◇, □, ◇□, □◇; the tightest times, the duration
+first and then the window's start.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.errors import ConfigurationError
+from tickwise.inference.bounding import Bounds
+from tickwise.inference.boxes import (
+    Node,
+    box_of,
+    everywhere,
+    first_key,
+    outermost,
+    ranges,
+    root,
+    single,
+    split,
+    split_between,
+    tighter,
+)
+from tickwise.inference.gains import gain_bound
+from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
+from tickwise.inference.levels import Coded, Levels
+from tickwise.inference.prior import Prior
+from tickwise.inference.scan import Worth, candidates, weigh
+from tickwise.inference.slot import Slot
+from tickwise.inference.space import OPERATORS, Gaps, to_formula
+from tickwise.inference.support import lasting
+from tickwise.logic.sdnf import Operator, Primitive
+
+_BATCH = 64  # nodes a compiled call; between two of them Ctrl-C, time and memory are looked at
+_TIE = 1e-12  # values nearer than this are equal
+_DIVES = 32  # batches that also look at a box of the best node, so that a search that is stopped has something good
+
+KINDS = tuple(itertools.product((True, False), (False, True)))
+"""Whether the operator is ◇ or ◇□, and whether the box is complemented."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExactSettings:
+    """The limits of an exact search; within them the result is proved.
+
+    Attributes:
+        levels: The most thresholds of a continuous variable.
+        seconds: The most time one search may take; None for as long as it takes.
+        nodes: The most nodes it may hold at a time, some 300 bytes each.
+        threads: Threads that bound nodes side by side; the result does not depend on it.
+
+    Raises:
+        ConfigurationError: If a limit is out of its range.
+    """
+
+    levels: int = 32
+    seconds: float | None = None
+    nodes: int = 2_000_000
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        for name in ("levels", "nodes", "threads"):
+            if getattr(self, name) < 1:
+                raise ConfigurationError(f"exact setting {name} is {getattr(self, name)}; use 1 or more")
+        if self.seconds is not None and not self.seconds > 0:
+            raise ConfigurationError(f"exact setting seconds is {self.seconds}; use a number above 0, or None")
+
+
+@dataclass(frozen=True, slots=True)
+class ExactResult:
+    """What an exact search found.
+
+    Attributes:
+        primitive: The best primitive.
+        objective: J of the formula with it.
+        rate: Its classification rate CR.
+        gain: Its information gain I.
+        value: J less the cost of a nested operator, which the search maximises.
+        bound: No primitive of the space is worth more than this.
+        nodes: How many nodes were bounded.
+        interrupted: Whether Ctrl-C ended the search.
+    """
+
+    primitive: Primitive
+    objective: float
+    rate: float
+    gain: float
+    value: float
+    bound: float
+    nodes: int
+    interrupted: bool = False
+
+    @property
+    def gap(self) -> float:
+        """How much better the best primitive of the space can be at most, in units of J."""
+        return max(self.bound - self.value, 0.0)
+
+    @property
+    def proved(self) -> bool:
+        """Whether the primitive is proved to be the best of the space."""
+        return self.gap <= _TIE
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ExactProblem:
+    """What an exact search looks for.
+
+    Attributes:
+        coded: The trajectories that the primitive decides on.
+        levels: The levels of the box sides.
+        prior: The prior G_L.
+        gaps: Free intervals of ticks, so that θ is in Υ_z.
+        worth: What counts beside the trajectories.
+        kinds: Pairs of `KINDS` that are allowed.
+        slot: The formula that the primitive is part of; None for the primitive alone.
+        supported: Whether each trajectory with label 1 is known to be possible under the prior.
+    """
+
+    coded: Coded
+    levels: Levels
+    prior: Prior
+    gaps: Gaps
+    worth: Worth
+    kinds: Sequence[tuple[bool, bool]] = KINDS
+    slot: Slot | None = None
+    supported: bool = False
+
+
+def worth_of(
+    coded: Coded, information_weight: float, nesting_cost: float = 0.0, operators: Sequence[Operator] = OPERATORS
+) -> Worth:
+    """What counts where the primitive decides on all trajectories.
+
+    Args:
+        coded: The trajectories.
+        information_weight: λ.
+        nesting_cost: What ◇□ and □◇ cost, in units of J.
+        operators: The operators that are allowed.
+
+    Returns:
+        The constants of `ExactProblem`.
+    """
+    nested = {operator.nested for operator in operators}
+    return Worth(0.0, float(coded.weights.sum()), False in nested, True in nested, nesting_cost, information_weight)
+
+
+def exact_search(problem: ExactProblem, settings: ExactSettings) -> ExactResult:
+    """Find the best primitive: line 11 of Algorithm 1, exactly.
+
+    Args:
+        problem: What to look for.
+        settings: The limits.
+
+    Returns:
+        The best primitive; see `ExactResult.proved`. Ctrl-C, once there is a primitive, ends the search with the
+        best so far.
+
+    Raises:
+        ConfigurationError: If no gap has room for a window.
+        UnknownVariableError: If the prior lacks a variable.
+    """
+    if not any(high - low >= (1 if problem.worth.plain else 2) for low, high in problem.gaps):
+        raise ConfigurationError("no gap has room for a window of two ticks; use a longer horizon")
+    return _Search(problem, settings).run()
+
+
+def beyond_levels(problem: ExactProblem, settings: ExactSettings) -> float:
+    """A bound on J for boxes with any sides at all: the most that more levels could give.
+
+    Between two levels a side is treated as loose for trajectories with label 1 and as tight for the others, so the
+    bound is above what is there. Where all thresholds are levels, it says nothing that `exact_search` does not.
+
+    Args:
+        problem: What is looked for.
+        settings: The limits; a search that is stopped gives a greater bound.
+
+    Returns:
+        No primitive with closed or open sides anywhere is worth more than this, in units of J.
+    """
+    prior = problem.prior.arrays(problem.levels.variables)
+    clock, order = _Clock(settings.seconds), itertools.count()
+    heap: list[tuple[float, int, Node]] = []
+    limits = gain_bound(prior, problem.levels, problem.levels.resolution)
+    with Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads) as bounds:
+        nodes = [everywhere(problem.levels, *kind) for kind in problem.kinds]
+        while True:
+            for node, bound in zip(nodes, bounds(nodes), strict=True):
+                heapq.heappush(heap, (-bound, next(order), node))
+            if clock.over or len(heap) > settings.nodes or not split_between(heap[0][-1]):
+                return -heap[0][0]
+            nodes = []
+            while heap and len(nodes) < _BATCH and (halves := split_between(heap[0][-1])):
+                heapq.heappop(heap)
+                nodes += halves
+
+
+class _Clock:
+    """How long something may take."""
+
+    def __init__(self, seconds: float | None) -> None:
+        self._end = math.inf if seconds is None else time.monotonic() + seconds
+
+    @property
+    def over(self) -> bool:
+        return time.monotonic() > self._end
+
+
+@dataclass(slots=True)
+class _Best:
+    """The best primitive so far; the key says which of equal ones is first."""
+
+    value: float = -math.inf
+    key: tuple[float, ...] = ()
+    node: Node | None = None
+    times: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
+    weight: float = 0.0
+    logarithm: float = 0.0
+
+    def beaten_by(self, value: float, key: tuple[float, ...]) -> bool:
+        """Whether a primitive of this value and key comes before it."""
+        return value > self.value + _TIE or (value >= self.value - _TIE and key < self.key)
+
+
+class _Search:
+    def __init__(self, problem: ExactProblem, settings: ExactSettings) -> None:
+        self.problem, self.settings = problem, settings
+        self.sides, _ = problem.levels.arrays()
+        self.prior = problem.prior.arrays(problem.levels.variables)
+        self.slot = problem.slot or Slot.alone(len(problem.levels.variables))
+        self.bounds = Bounds(
+            problem.coded, problem.gaps, problem.worth, gain_bound(self.prior, problem.levels), settings.threads
+        )
+        self.rejected = float(problem.coded.weights[~problem.coded.positive].sum())
+        self.best = _Best()
+        self.heap: list[tuple[float, tuple[float, ...], int, Node]] = []
+        self.order = itertools.count()
+        self.nodes = 0
+
+    def run(self) -> ExactResult:
+        clock, interrupted, bound = _Clock(self.settings.seconds), False, -math.inf
+        with self.bounds:
+            try:
+                self._push([root(self.problem.levels, *kind) for kind in self.problem.kinds])
+                batches = 0
+                while self.heap:
+                    full = len(self.heap) > self.settings.nodes
+                    if (full or clock.over) and self.best.node is not None:
+                        bound = -self.heap[0][0]
+                        break
+                    self._step(dive=batches < _DIVES)
+                    batches += 1
+            except KeyboardInterrupt:
+                if self.best.node is None:
+                    raise
+                interrupted, bound = True, -self.heap[0][0] if self.heap else math.inf
+        return self._result(max(bound, self.best.value), interrupted)
+
+    def _step(self, *, dive: bool) -> None:
+        """Take the nodes with the greatest bounds: split ranges, look at single boxes."""
+        children: list[Node] = []
+        for _ in range(_BATCH):
+            self._drop_beaten()
+            if not self.heap:
+                break
+            node = self.heap[0][-1]
+            if single(node):
+                if children:  # one of them may come before it
+                    break
+                self._look(node)
+            else:
+                if dive and not children:
+                    self._look(outermost(node))
+                children += split(node)
+            heapq.heappop(self.heap)
+        self._push(children)
+
+    def _drop_beaten(self) -> None:
+        """Take nodes off the top that the best so far comes before."""
+        while self.heap and not self.best.beaten_by(-self.heap[0][0], self.heap[0][1]):
+            if -self.heap[0][0] < self.best.value - _TIE:  # as are all after it
+                self.heap.clear()
+            else:
+                heapq.heappop(self.heap)
+
+    def _push(self, nodes: list[Node]) -> None:
+        for node, bound in zip(nodes, self.bounds(nodes), strict=True):
+            key = first_key(node, self.problem.levels)
+            if self.best.beaten_by(bound, key):
+                heapq.heappush(self.heap, (-round(bound, 13), key, next(self.order), node))
+        self.nodes += len(nodes)
+
+    def _look(self, node: Node) -> None:
+        """Give the windows and durations of a single box that can win their exact value."""
+        problem, worth, best = self.problem, self.problem.worth, self.best
+        lower, upper = box_of(node, self.sides)
+        if not (np.isfinite(lower) | np.isfinite(upper)).any():
+            return  # it says nothing
+        floor = self._floor(node)
+        enough = best.value - _TIE
+        found = candidates(problem.coded, node, *self.bounds.arguments, enough, floor)
+        informed = worth.information_weight > 0
+        neighbours = [(near, self._floor(near)) for near in tighter(node, problem.levels)] if informed else []
+        for k in np.argsort(-found[2], kind="stable"):
+            times, weight, most = found[0][k], float(found[1][k]), float(found[2][k])
+            if most < best.value - _TIE:
+                break
+            if any(self._weigh(near, times) >= max(weight, np.nextafter(least, np.inf)) for near, least in neighbours):
+                continue
+            logarithm = self._log_probability(node, times, lower, upper) if informed else 0.0
+            value = self._value(times, weight, logarithm)
+            key = (*first_key(node, self.problem.levels), *self._times_key(node, times))
+            if best.beaten_by(value, key):
+                best = self.best = _Best(value, key, node, times, weight, logarithm)
+
+    def _times_key(self, node: Node, times: NDArray[np.int64]) -> tuple[int, ...]:
+        start, end, duration = times.tolist()
+        return (duration > 0, -duration, -start, end) if node[0] else (duration > 0, duration, start, -end)
+
+    def _value(self, times: NDArray[np.int64], weight: float, logarithm: float) -> float:
+        worth = self.problem.worth
+        rate = (worth.base + weight) / worth.total
+        cost = worth.nesting_cost if times[2] else 0.0
+        return rate + worth.information_weight * self._gain(logarithm) - cost
+
+    def _gain(self, logarithm: float) -> float:
+        return 0.0 if math.isinf(logarithm) else -logarithm / self.problem.prior.horizon + 0.0
+
+    def _weigh(self, node: Node, times: NDArray[np.int64]) -> float:
+        return float(weigh(self.problem.coded, node[0] == 1, node[1] == 1, ranges(node)[:, 0].reshape(-1), times))
+
+    def _floor(self, node: Node) -> float:
+        """The weight above which all of a box's primitives are known to have a positive probability."""
+        if self.problem.worth.information_weight == 0:
+            return -math.inf
+        if len(self.slot.shape.operators) == 1 and lasting(self.prior, *box_of(node, self.sides), bool(node[1])):
+            return -math.inf
+        # one that classifies more rightly than rejecting all is satisfied by a trajectory that is possible
+        return self.rejected if self.problem.supported else math.inf
+
+    def _log_probability(
+        self,
+        node: Node,
+        times: NDArray[np.int64],
+        lower: NDArray[np.float64],
+        upper: NDArray[np.float64],
+    ) -> float:
+        operator = _operator(node, times)
+        return self.slot.log_probability(self.prior, operator, bool(node[1]), times, lower, upper)
+
+    def _result(self, bound: float, interrupted: bool) -> ExactResult:
+        best, worth = self.best, self.problem.worth
+        assert best.node is not None  # every gap has room for a window of some box
+        lower, upper = box_of(best.node, self.sides)
+        shape = Shape(np.array([0, 1]), np.array([_operator(best.node, best.times)]), np.array([best.node[1] == 1]))
+        formula = to_formula(self.problem.levels.variables, shape, best.times[None], lower[None], upper[None])
+        rate, logarithm = (worth.base + best.weight) / worth.total, best.logarithm
+        if worth.information_weight == 0:
+            logarithm = self._log_probability(best.node, best.times, lower, upper)
+        gain = self._gain(logarithm)
+        objective = rate + worth.information_weight * gain
+        return ExactResult(
+            formula.disjuncts[0].primitives[0], objective, rate, gain, best.value, bound, self.nodes, interrupted
+        )
+
+
+def _operator(node: Node, times: NDArray[np.int64]) -> int:
+    """The compiled code of ◇, □, ◇□ or □◇."""
+    return (0 if node[0] else 1) + (EVENTUALLY_ALWAYS if times[2] else 0)

@@ -1,0 +1,101 @@
+"""Upper bounds on the information gain of the primitives of many boxes at once."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise._jit import njit
+from tickwise.inference.kernels import PriorArrays
+from tickwise.inference.levels import Levels
+
+EXISTENTIAL, COMPLEMENTED, SIDES = 0, 1, 2
+"""Where a node says ◇ or ◇□ rather than □ or □◇, the polarity, and where its sides begin."""
+
+
+class GainBound(NamedTuple):
+    """What bounds the information gain of a primitive.
+
+    Attributes:
+        independent: Whether ticks are independent draws, of which the measure of a box is known.
+        horizon: The prior's last tick L.
+        most: The bound where they are not.
+        places: For each variable and level the share of the prior's range below it, shape ``(variables, levels)``.
+        least: The least positive share between two levels of each variable, shape ``(variables,)``.
+    """
+
+    independent: bool
+    horizon: int
+    most: float
+    places: NDArray[np.float64]
+    least: NDArray[np.float64]
+
+
+def gain_bound(prior: PriorArrays, levels: Levels, resolution: NDArray[np.float64] | None = None) -> GainBound:
+    """What bounds the information gain of one primitive alone, and so that of a formula with it.
+
+    Args:
+        prior: The prior's arrays.
+        levels: The levels.
+        resolution: The least distance between the two sides of each variable; None for that of two levels.
+    """
+    sides, counts = levels.arrays()
+    shares, least = np.zeros_like(sides), np.zeros(len(counts))
+    if prior.independent:
+        width = (prior.high - prior.low)[:, None]
+        shares = np.clip((sides - prior.low[:, None]) / width, 0.0, 1.0)
+        for variable, count in enumerate(counts):
+            steps = np.diff(shares[variable, :count])
+            least[variable] = steps[steps > 0].min() if (steps > 0).any() else 1.0
+        if resolution is not None:
+            least = np.minimum(least, resolution / width[:, 0])
+    return GainBound(prior.independent, prior.horizon, prior.most, shares, least)
+
+
+@njit
+def _least_measure(node: NDArray[np.int64], prior: GainBound) -> float:
+    """A positive lower bound on the probability of the predicate at one tick, over the boxes of a node."""
+    width = (len(node) - SIDES) // 4
+    inner, outer, border = 1.0, 1.0, 1.0
+    for variable in range(width):
+        lo_min, lo_max = node[SIDES + variable], node[SIDES + width + variable]
+        hi_min, hi_max = node[SIDES + 2 * width + variable], node[SIDES + 3 * width + variable]
+        places = prior.places[variable]
+        share = places[hi_min] - places[lo_max] if hi_min > lo_max else 0.0
+        inner *= share if share > 0 else prior.least[variable]
+        outer *= places[hi_max] - places[lo_min]
+        border = min(border, prior.least[variable])
+    if node[COMPLEMENTED] == 1:
+        return 1.0 - outer if outer < 1.0 else border
+    return inner
+
+
+@njit
+def gain_bounds(node: NDArray[np.int64], prior: GainBound, ticks: int) -> NDArray[np.float64]:
+    """Upper bounds on the information gain, for a window of b - a + 1 ticks and a duration c at ``[b - a, c]``."""
+    bounds = np.full((ticks, ticks), prior.most)
+    if not prior.independent:
+        return bounds
+    holds = _least_measure(node, prior)
+    for duration in range(ticks):
+        needed = duration + 1
+        if node[EXISTENTIAL] == 1:
+            # the probability that a run of so many ticks has begun, one tick after the other
+            run = holds**needed
+            found = np.empty(ticks + 1)
+            found[0] = run
+            for span in range(1, ticks - duration):
+                before = found[span - needed - 1] if span > needed else 0.0
+                found[span] = found[span - 1] + (1.0 - holds) * run * (1.0 - before)
+                bounds[span, duration] = -np.log(min(found[span], 1.0)) / prior.horizon
+        else:
+            # enough that the predicate holds at every so many ticks, or somewhere in each block of half as many
+            half = (duration + 2) // 2
+            block = -np.log1p(-((1.0 - holds) ** half))
+            for span in range(1, ticks - duration):
+                places = span + 1 + duration
+                cost = min(-np.log(holds) * (places // needed), block * ((places + half - 1) // half))
+                bounds[span, duration] = cost / prior.horizon
+    return bounds

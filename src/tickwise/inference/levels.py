@@ -1,0 +1,172 @@
+"""The levels that box sides may take in an exact search, and trajectories coded by them, as bits over the ticks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise._jit import njit
+from tickwise.errors import ConfigurationError
+from tickwise.inference.decimals import shortest_between
+from tickwise.inference.space import SearchSpace
+from tickwise.inference.trajectories import LabelledTrajectories
+
+WORD = 64
+"""Ticks in a machine word."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Levels:
+    """For each variable the numbers that a side of a box may be, in increasing order.
+
+    Attributes:
+        variables: Names of the variables.
+        sides: For each variable its levels; where a side may be open, -inf comes first and inf last.
+        complete: Whether every threshold that tells the data's values apart is among the levels. It is not where a
+            continuous variable has more distinct values than the cap allows thresholds.
+        resolution: For each variable the least distance between two thresholds, be they levels or not, shape
+            ``(variables,)``.
+    """
+
+    variables: tuple[str, ...]
+    sides: tuple[NDArray[np.float64], ...]
+    complete: bool
+    resolution: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, space: SearchSpace, data: LabelledTrajectories, cap: int) -> Levels:
+        """The levels of a search space: its edges, and between neighbouring values of a continuous variable.
+
+        A continuous variable with more than ``cap`` such places gets half of its levels evenly by rank and half evenly
+        over its range, so that rare values are told apart too.
+
+        Args:
+            space: The search space.
+            data: The trajectories whose values the levels of continuous variables lie between.
+            cap: The most levels of a continuous variable, open sides not counted.
+
+        Returns:
+            The levels.
+
+        Raises:
+            ConfigurationError: If the cap is below 1.
+        """
+        if cap < 1:
+            raise ConfigurationError(f"a cap of {cap} levels leaves no threshold; use 1 or more")
+        sides, complete, resolution = [], True, []
+        for column, (edges, continuous) in enumerate(zip(space.edges, space.continuous, strict=True)):
+            if not continuous:
+                sides.append(np.array(edges))
+                resolution.append(np.diff(edges).min())
+                continue
+            values = np.sort(data.values[..., column][~np.isnan(data.values[..., column])])
+            low, high = _neighbours(values, cap)
+            steps = np.diff(values)
+            complete = complete and len(low) == np.count_nonzero(steps)
+            resolution.append(steps[steps > 0].min() if steps.any() else edges[-1] - edges[0])
+            cuts = [shortest_between(*pair) for pair in zip(low.tolist(), high.tolist(), strict=True)]
+            sides.append(np.array([-math.inf, *cuts, math.inf]))
+        if all(len(levels) == 2 and math.isinf(levels[0]) for levels in sides):  # nothing to tell apart
+            sides[-1] = np.array([-math.inf, *space.edges[-1], math.inf])
+        return cls(space.variables, tuple(sides), complete, np.array(resolution))
+
+    def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """The levels padded with NaN, shape ``(variables, most)``, and how many each variable has."""
+        counts = np.array([len(levels) for levels in self.sides], dtype=np.int64)
+        padded = np.full((len(counts), counts.max()), np.nan)
+        for row, levels in zip(padded, self.sides, strict=True):
+            row[: len(levels)] = levels
+        return padded, counts
+
+
+def _neighbours(values: NDArray[np.float64], cap: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Pairs of neighbouring distinct values of a sorted array, at most ``cap`` pairs."""
+    rises = np.flatnonzero(np.diff(values))
+    if len(rises) > cap:
+        by_rank = np.linspace(0, len(values) - 1, cap - cap // 2 + 2)[1:-1]
+        by_range = np.searchsorted(values, np.linspace(values[0], values[-1], cap // 2 + 2)[1:-1])
+        wanted = np.concatenate([by_rank, by_range]).astype(np.int64)
+        rises = np.unique(rises[np.clip(np.searchsorted(rises, wanted), 0, len(rises) - 1)])
+    return values[rises], values[rises + 1]
+
+
+class Coded(NamedTuple):
+    """Trajectories as bits: for every level, the ticks at which a variable is at least, or at most, that level.
+
+    Attributes:
+        at_least: Bit t is set where the value at tick t is at least the level, shape ``(variables, levels, n, words)``.
+        at_most: Likewise for at most.
+        alive: The ticks that each trajectory has, shape ``(n, words)``.
+        positive: Whether the label is 1, shape ``(n,)``.
+        weights: The weight in the classification rate, shape ``(n,)``.
+    """
+
+    at_least: NDArray[np.uint64]
+    at_most: NDArray[np.uint64]
+    alive: NDArray[np.uint64]
+    positive: NDArray[np.bool_]
+    weights: NDArray[np.float64]
+
+    def select(self, mask: NDArray[np.bool_]) -> Coded:
+        """The trajectories where the mask is true."""
+        at_least, at_most = self.at_least[:, :, mask], self.at_most[:, :, mask]
+        return Coded(at_least, at_most, self.alive[mask], self.positive[mask], self.weights[mask])
+
+
+def code(data: LabelledTrajectories, weights: NDArray[np.float64], levels: Levels, horizon: int) -> Coded:
+    """Code labelled trajectories by levels, up to a horizon.
+
+    Args:
+        data: The trajectories.
+        weights: The weight of each in the classification rate, shape ``(n,)``.
+        levels: The levels.
+        horizon: The last tick that matters.
+
+    Returns:
+        ``2 * variables * levels + 1`` words of 8 bytes for every 64 ticks of a trajectory, and 9 bytes.
+    """
+    padded, counts = levels.arrays()
+    words = horizon // WORD + 1
+    shape = (len(counts), padded.shape[1], len(data), words)
+    at_least, at_most = np.zeros(shape, dtype=np.uint64), np.zeros(shape, dtype=np.uint64)
+    alive = np.zeros((len(data), words), dtype=np.uint64)
+    _code(data.values, data.lengths, padded, counts, horizon, at_least, at_most, alive)
+    return Coded(at_least, at_most, alive, data.labels == 1, np.asarray(weights, dtype=np.float64))
+
+
+def code_parts(
+    parts: Iterable[tuple[LabelledTrajectories, NDArray[np.float64]]], levels: Levels, horizon: int
+) -> Coded:
+    """Code data that comes in parts, each held no longer than it takes to code it: what `code` gives of the whole."""
+    coded = [code(data, weights, levels, horizon) for data, weights in parts]
+    at_least, at_most, *rest = zip(*coded, strict=True)
+    return Coded(np.concatenate(at_least, axis=2), np.concatenate(at_most, axis=2), *map(np.concatenate, rest))
+
+
+@njit
+def _code(
+    values: NDArray[np.float64],
+    lengths: NDArray[np.int64],
+    levels: NDArray[np.float64],
+    counts: NDArray[np.int64],
+    horizon: int,
+    at_least: NDArray[np.uint64],
+    at_most: NDArray[np.uint64],
+    alive: NDArray[np.uint64],
+) -> None:
+    for i in range(len(values)):
+        for tick in range(min(lengths[i], horizon + 1)):
+            word, bit = tick // WORD, np.uint64(1) << np.uint64(tick % WORD)
+            alive[i, word] |= bit
+            for variable in range(len(counts)):
+                value = values[i, tick, variable]
+                for level in range(counts[variable]):
+                    if value >= levels[variable, level]:
+                        at_least[variable, level, i, word] |= bit
+                    if value <= levels[variable, level]:
+                        at_most[variable, level, i, word] |= bit
