@@ -5,11 +5,10 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from tickwise.inference.boxes import Node
-from tickwise.inference.levels import Coded
 from tickwise.inference.gains import GainBound
+from tickwise.inference.levels import Coded
 from tickwise.inference.scan import Worth, bound_all
 from tickwise.inference.space import Gaps
 

@@ -6,8 +6,8 @@ windows without such a beginning, and the maximal ones say it all: the weight of
 over (start, end, duration), and the sum over all maximal windows that contain a window is a running sum in both its
 ends. One pass over the trajectories thus gives every window and duration of a box.
 
-A node of the search is a range of boxes. Positive trajectories are judged by the loosest of its predicates, negative
-ones by the tightest; this bounds the classification rate of each of its boxes from above; of a single box it is the
+A node of the search is a range of boxes. Trajectories with label 1 are judged by the loosest of its predicates, others
+by the tightest; this bounds the classification rate of each of its boxes from above; of a single box it is the
 rate itself. A node is an array ``[existential, complemented, lo_min…, lo_max…, hi_min…, hi_max…]`` with a level's number
 for every variable.
 """
