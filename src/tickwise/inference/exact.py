@@ -130,6 +130,7 @@ class ExactProblem:
         kinds: Pairs of `KINDS` that are allowed.
         slot: The formula that the primitive is part of; None for the primitive alone.
         supported: Whether each trajectory with label 1 is known to be possible under the prior.
+        roots: Where to look only; None for all boxes of the kinds.
     """
 
     coded: Coded
@@ -140,6 +141,7 @@ class ExactProblem:
     kinds: Sequence[tuple[bool, bool]] = KINDS
     slot: Slot | None = None
     supported: bool = False
+    roots: Sequence[Node] | None = None
 
 
 def worth_of(
@@ -256,7 +258,8 @@ class _Search:
         clock, interrupted, bound = _Clock(self.settings.seconds), False, -math.inf
         with self.bounds:
             try:
-                self._push([root(self.problem.levels, *kind) for kind in self.problem.kinds])
+                kinds, roots = self.problem.kinds, self.problem.roots
+                self._push([root(self.problem.levels, *kind) for kind in kinds] if roots is None else list(roots))
                 batches = 0
                 while self.heap:
                     full = len(self.heap) > self.settings.nodes

@@ -42,8 +42,9 @@ class Levels:
     def of(cls, space: SearchSpace, data: LabelledTrajectories, cap: int) -> Levels:
         """The levels of a search space: its edges, and between neighbouring values of a continuous variable.
 
-        A continuous variable with more than ``cap`` such places gets half of its levels evenly by rank and half evenly
-        over its range, so that rare values are told apart too.
+        A continuous variable with more than ``cap`` such places gets a third of its levels evenly by rank, a third
+        evenly over its range, so that rare values are told apart too, and a third where the extremes of the
+        trajectories leave the widest gaps.
 
         Args:
             space: The search space.
@@ -64,8 +65,10 @@ class Levels:
                 sides.append(np.array(edges))
                 resolution.append(np.diff(edges).min())
                 continue
-            values = np.sort(data.values[..., column][~np.isnan(data.values[..., column])])
-            low, high = _neighbours(values, cap)
+            states = data.values[..., column]
+            values = np.sort(states[~np.isnan(states)])
+            extremes = np.sort(np.concatenate([np.nanmin(states, axis=1), np.nanmax(states, axis=1)]))
+            low, high = _neighbours(values, extremes, cap)
             steps = np.diff(values)
             complete = complete and len(low) == np.count_nonzero(steps)
             resolution.append(steps[steps > 0].min() if steps.any() else edges[-1] - edges[0])
@@ -84,13 +87,18 @@ class Levels:
         return padded, counts
 
 
-def _neighbours(values: NDArray[np.float64], cap: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _neighbours(
+    values: NDArray[np.float64], extremes: NDArray[np.float64], cap: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Pairs of neighbouring distinct values of a sorted array, at most ``cap`` pairs."""
     rises = np.flatnonzero(np.diff(values))
     if len(rises) > cap:
-        by_rank = np.linspace(0, len(values) - 1, cap - cap // 2 + 2)[1:-1]
-        by_range = np.searchsorted(values, np.linspace(values[0], values[-1], cap // 2 + 2)[1:-1])
-        wanted = np.concatenate([by_rank, by_range]).astype(np.int64)
+        third = cap // 3
+        by_rank = np.linspace(0, len(values) - 1, cap - 2 * third + 2)[1:-1]
+        by_range = np.searchsorted(values, np.linspace(values[0], values[-1], third + 2)[1:-1])
+        widest = np.sort(np.argsort(np.diff(extremes), kind="stable")[::-1][:third])
+        between = np.searchsorted(values, (extremes[widest] + extremes[widest + 1]) / 2) - 1
+        wanted = np.concatenate([by_rank, by_range, between]).astype(np.int64)
         rises = np.unique(rises[np.clip(np.searchsorted(rises, wanted), 0, len(rises) - 1)])
     return values[rises], values[rises + 1]
 
