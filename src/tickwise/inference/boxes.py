@@ -95,11 +95,11 @@ def split_between(node: Node) -> list[Node]:
     return [half for half in halves if (ranges(half)[0, 0] < ranges(half)[1, 1]).all()]
 
 
-def first_key(node: Node, levels: Levels) -> tuple[int, ...]:
+def first_key(node: Node, levels: Levels, nested: bool) -> tuple[int, ...]:
     """Where the first of a node's boxes stands among primitives of equal worth.
 
-    In this order: the fewest closed sides of variables whose sides may be open; the plain box before its complement;
-    the tightest predicate, variable by variable; ◇ and ◇□ before □ and □◇.
+    In this order: the fewest closed sides of variables whose sides may be open; ◇ and □ before ◇□ and □◇; the plain
+    box before its complement; the tightest predicate, variable by variable; ◇ and ◇□ before □ and □◇.
     """
     (lo_min, lo_max), (hi_min, hi_max) = ranges(node).tolist()
     closed, tightest = 0, list[int]()
@@ -108,7 +108,7 @@ def first_key(node: Node, levels: Levels) -> tuple[int, ...]:
             closed += math.isfinite(sides[lo_min[variable]]) + math.isfinite(sides[hi_max[variable]])
         loose, tight = (lo_min[variable], -hi_max[variable]), (-lo_max[variable], hi_min[variable])
         tightest += loose if node[1] else tight
-    return (closed, int(node[1]), *tightest, 1 - int(node[0]))
+    return (closed, int(nested), int(node[1]), *tightest, 1 - int(node[0]))
 
 
 def tighter(node: Node, levels: Levels) -> Iterator[Node]:

@@ -5,9 +5,9 @@ all of it, windows and durations included. The node with the greatest bound is s
 windows and durations that can still win get their information gain exactly. The search ends when the best primitive
 found is worth at least every bound left: it is then proved to be the best.
 
-Of primitives of equal J (to 12 decimals) the first wins by: the fewest closed sides of continuous variables; the plain
-box before its complement; the tightest predicate, variable by variable; ◇, □, ◇□, □◇; the tightest times, the duration
-first and then the window's start.
+Of primitives of equal J (to 12 decimals) the first wins by: the fewest closed sides of continuous variables; ◇ and □
+before ◇□ and □◇; the plain box before its complement; the tightest predicate, variable by variable; ◇ and ◇□ before □
+and □◇; the tightest times, the duration first and then the window's start.
 """
 
 from __future__ import annotations
@@ -48,8 +48,10 @@ from tickwise.inference.support import lasting
 from tickwise.logic.sdnf import Operator, Primitive
 
 _BATCH = 64  # nodes a compiled call; between two of them Ctrl-C, time and memory are looked at
-_TIE = 1e-12  # values nearer than this are equal
 _DIVES = 32  # batches that also look at a box of the best node, so that a search that is stopped has something good
+
+TIE = 1e-12
+"""Values of J nearer than this are equal."""
 
 KINDS = tuple(itertools.product((True, False), (False, True)))
 """Whether the operator is ◇ or ◇□, and whether the box is complemented."""
@@ -114,7 +116,7 @@ class ExactResult:
     @property
     def proved(self) -> bool:
         """Whether the primitive is proved to be the best of the space."""
-        return self.gap <= _TIE
+        return self.gap <= TIE
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -179,7 +181,24 @@ def exact_search(problem: ExactProblem, settings: ExactSettings) -> ExactResult:
     """
     if not any(high - low >= (1 if problem.worth.plain else 2) for low, high in problem.gaps):
         raise ConfigurationError("no gap has room for a window of two ticks; use a longer horizon")
-    return _Search(problem, settings).run()
+    found = _Search(problem, settings, -math.inf).run()
+    if found is None:
+        raise ConfigurationError("no box has a side; give levels that tell the values of a variable apart")
+    return found
+
+
+def improve(problem: ExactProblem, settings: ExactSettings, least: float) -> ExactResult | None:
+    """Find the best primitive of those that are worth at least so much, sooner than `exact_search` finds the best.
+
+    Args:
+        problem: What to look for.
+        settings: The limits.
+        least: The least worth, in units of J.
+
+    Returns:
+        The best primitive; None if none is worth so much, or none was found within the limits.
+    """
+    return _Search(problem, settings, least).run()
 
 
 def beyond_levels(problem: ExactProblem, settings: ExactSettings) -> float:
@@ -227,8 +246,8 @@ class _Clock:
 class _Best:
     """The best primitive so far; the key says which of equal ones is first."""
 
-    value: float = -math.inf
-    key: tuple[float, ...] = ()
+    value: float
+    key: tuple[float, ...] = (math.inf,)
     node: Node | None = None
     times: NDArray[np.int64] = field(default_factory=lambda: np.zeros(3, dtype=np.int64))
     weight: float = 0.0
@@ -236,11 +255,11 @@ class _Best:
 
     def beaten_by(self, value: float, key: tuple[float, ...]) -> bool:
         """Whether a primitive of this value and key comes before it."""
-        return value > self.value + _TIE or (value >= self.value - _TIE and key < self.key)
+        return value > self.value + TIE or (value >= self.value - TIE and key < self.key)
 
 
 class _Search:
-    def __init__(self, problem: ExactProblem, settings: ExactSettings) -> None:
+    def __init__(self, problem: ExactProblem, settings: ExactSettings, least: float) -> None:
         self.problem, self.settings = problem, settings
         self.sides, _ = problem.levels.arrays()
         self.prior = problem.prior.arrays(problem.levels.variables)
@@ -249,12 +268,12 @@ class _Search:
             problem.coded, problem.gaps, problem.worth, gain_bound(self.prior, problem.levels), settings.threads
         )
         self.rejected = float(problem.coded.weights[~problem.coded.positive].sum())
-        self.best = _Best()
+        self.best = _Best(least)
         self.heap: list[tuple[float, tuple[float, ...], int, Node]] = []
         self.order = itertools.count()
         self.nodes = 0
 
-    def run(self) -> ExactResult:
+    def run(self) -> ExactResult | None:
         clock, interrupted, bound = _Clock(self.settings.seconds), False, -math.inf
         with self.bounds:
             try:
@@ -263,16 +282,20 @@ class _Search:
                 batches = 0
                 while self.heap:
                     full = len(self.heap) > self.settings.nodes
-                    if (full or clock.over) and self.best.node is not None:
+                    if full or (clock.over and self._started):
                         bound = -self.heap[0][0]
                         break
                     self._step(dive=batches < _DIVES)
                     batches += 1
             except KeyboardInterrupt:
-                if self.best.node is None:
+                if not self._started:
                     raise
                 interrupted, bound = True, -self.heap[0][0] if self.heap else math.inf
-        return self._result(max(bound, self.best.value), interrupted)
+        return None if self.best.node is None else self._result(max(bound, self.best.value), interrupted)
+
+    @property
+    def _started(self) -> bool:
+        return math.isfinite(self.best.value)
 
     def _step(self, *, dive: bool) -> None:
         """Take the nodes with the greatest bounds: split ranges, look at single boxes."""
@@ -296,14 +319,14 @@ class _Search:
     def _drop_beaten(self) -> None:
         """Take nodes off the top that the best so far comes before."""
         while self.heap and not self.best.beaten_by(-self.heap[0][0], self.heap[0][1]):
-            if -self.heap[0][0] < self.best.value - _TIE:  # as are all after it
+            if -self.heap[0][0] < self.best.value - TIE:  # as are all after it
                 self.heap.clear()
             else:
                 heapq.heappop(self.heap)
 
     def _push(self, nodes: list[Node]) -> None:
         for node, bound in zip(nodes, self.bounds(nodes), strict=True):
-            key = first_key(node, self.problem.levels)
+            key = first_key(node, self.problem.levels, not self.problem.worth.plain)
             if self.best.beaten_by(bound, key):
                 heapq.heappush(self.heap, (-round(bound, 13), key, next(self.order), node))
         self.nodes += len(nodes)
@@ -315,25 +338,21 @@ class _Search:
         if not (np.isfinite(lower) | np.isfinite(upper)).any():
             return  # it says nothing
         floor = self._floor(node)
-        enough = best.value - _TIE
+        enough = best.value - TIE
         found = candidates(problem.coded, node, *self.bounds.arguments, enough, floor)
         informed = worth.information_weight > 0
         neighbours = [(near, self._floor(near)) for near in tighter(node, problem.levels)] if informed else []
         for k in np.argsort(-found[2], kind="stable"):
             times, weight, most = found[0][k], float(found[1][k]), float(found[2][k])
-            if most < best.value - _TIE:
+            if most < best.value - TIE:
                 break
             if any(self._weigh(near, times) >= max(weight, np.nextafter(least, np.inf)) for near, least in neighbours):
                 continue
             logarithm = self._log_probability(node, times, lower, upper) if informed else 0.0
             value = self._value(times, weight, logarithm)
-            key = (*first_key(node, self.problem.levels), *self._times_key(node, times))
+            key = (*first_key(node, problem.levels, times[2] > 0), *_times_key(node, times))
             if best.beaten_by(value, key):
                 best = self.best = _Best(value, key, node, times, weight, logarithm)
-
-    def _times_key(self, node: Node, times: NDArray[np.int64]) -> tuple[int, ...]:
-        start, end, duration = times.tolist()
-        return (duration > 0, -duration, -start, end) if node[0] else (duration > 0, duration, start, -end)
 
     def _value(self, times: NDArray[np.int64], weight: float, logarithm: float) -> float:
         worth = self.problem.worth
@@ -368,7 +387,7 @@ class _Search:
 
     def _result(self, bound: float, interrupted: bool) -> ExactResult:
         best, worth = self.best, self.problem.worth
-        assert best.node is not None  # every gap has room for a window of some box
+        assert best.node is not None
         lower, upper = box_of(best.node, self.sides)
         shape = Shape(np.array([0, 1]), np.array([_operator(best.node, best.times)]), np.array([best.node[1] == 1]))
         formula = to_formula(self.problem.levels.variables, shape, best.times[None], lower[None], upper[None])
@@ -380,6 +399,12 @@ class _Search:
         return ExactResult(
             formula.disjuncts[0].primitives[0], objective, rate, gain, best.value, bound, self.nodes, interrupted
         )
+
+
+def _times_key(node: Node, times: NDArray[np.int64]) -> tuple[int, ...]:
+    """The tightest times first: the longest run wanted of ◇ and ◇□, the shortest of □ and □◇."""
+    start, end, duration = times.tolist()
+    return (-duration, -start, end) if node[0] else (duration, start, -end)
 
 
 def _operator(node: Node, times: NDArray[np.int64]) -> int:

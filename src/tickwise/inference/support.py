@@ -44,3 +44,47 @@ def lasting(prior: PriorArrays, lower: NDArray[np.float64], upper: NDArray[np.fl
                     stays[state] = False
                     changed = True
     return bool(np.any(stays & (prior.forward[0] > 0)))
+
+
+def possible(prior: PriorArrays, values: NDArray[np.float64], lengths: NDArray[np.int64]) -> bool:
+    """Whether a prior can give every one of some trajectories.
+
+    Args:
+        prior: The prior's arrays, coordinates in the order of the trajectories' variables.
+        values: States, shape ``(n, ticks, variables)``.
+        lengths: Number of states of each trajectory, shape ``(n,)``.
+
+    Returns:
+        Whether each is a path of the chain, or lies in the range of the independent draws.
+    """
+    alive = np.arange(values.shape[1]) < lengths[:, None]
+    if prior.independent:
+        states = values[alive]
+        return bool(((states >= prior.low) & (states <= prior.high)).all())
+    places, at = np.unique(prior.coordinates, axis=0, return_inverse=True)
+    numbers = {tuple(place): number for number, place in enumerate(places.tolist())}
+    wanted = np.full(alive.shape, -1)
+    wanted[alive] = [numbers.get(tuple(state), -2) for state in values[alive].tolist()]
+    return bool(_walks(prior, at.reshape(-1).astype(np.int64), wanted))
+
+
+@njit
+def _walks(prior: PriorArrays, places: NDArray[np.int64], wanted: NDArray[np.int64]) -> bool:
+    """Whether for each row there is a path of the chain through the wanted places; -1 is the end."""
+    for i in range(len(wanted)):
+        here = np.empty(len(places), dtype=np.bool_)
+        for state in range(len(places)):
+            here[state] = prior.forward[0, state] > 0 and places[state] == wanted[i, 0]
+        for tick in range(1, wanted.shape[1]):
+            if wanted[i, tick] == -1:
+                break
+            there = np.zeros(len(places), dtype=np.bool_)
+            for source in np.flatnonzero(here):
+                for edge in range(prior.indptr[source], prior.indptr[source + 1]):
+                    successor = prior.indices[edge]
+                    if prior.weights[edge] > 0 and places[successor] == wanted[i, tick]:
+                        there[successor] = True
+            here = there
+        if not here.any():
+            return False
+    return True
