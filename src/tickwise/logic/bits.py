@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise._jit import njit
-from tickwise.logic.program import BOTH, CONSTANT, EITHER, EVERY, LITERAL, SOME
+from tickwise.logic.program import BOTH, CONSTANT, EITHER, EVERY, INSIDE, OUTSIDE, ROUND
 
 Words = NDArray[np.uint64]
 U = np.uint64
 NONE, ALL = U(0), U(0xFFFF_FFFF_FFFF_FFFF)
 LANES = 256  # trajectories at a time: the signals of a block stay in the processor's cache
 WORDS = 4096
-MOVE = -1
 
 
 @njit
@@ -43,6 +42,7 @@ def encode(
     first: int,
     count: int,
     stride: int,
+    spans: NDArray[np.int64],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
     codes: Words,
@@ -50,46 +50,52 @@ def encode(
     """Say for each tick of some trajectories which boxes the state is in.
 
     Args:
-        rows: The values of each trajectory in a row, shape (n, at least ticks * stride).
+        rows: The values of each trajectory in a row, shape (n, ticks * stride).
         first: The first trajectory.
         count: The number of trajectories.
         stride: The number of variables, the bits of a tick.
-        lower: The least values inside, shape (boxes, ticks * stride).
+        spans: The first tick of each box and how many, shape (boxes, 2).
+        lower: The least values inside, shape (boxes, values).
         upper: The greatest values inside.
-        codes: Takes the answers, shape (boxes, words, at least count).
+        codes: Takes the answers, shape (boxes, words, at least count); the first bit is that of a span's first tick.
     """
-    boxes, values = lower.shape
-    words = words_of(values)
-    for lane in range(count):
-        row = U(first + lane)
-        for box in range(boxes):
-            for w in range(words):
-                word = NONE
+    for box in range(len(spans)):
+        begin = spans[box, 0] * stride
+        values = spans[box, 1] * stride
+        values = min((values + ROUND - 1) // ROUND * ROUND, rows.shape[1] - begin)
+        for lane in range(count):
+            row = U(first + lane)
+            for w in range(words_of(values)):
+                column, word = U(begin + 64 * w), NONE
                 for k in range(min(64, values - 64 * w)):
-                    value = rows[row, 64 * w + k]
+                    value = rows[row, column + U(k)]
                     word |= U((value >= lower[box, 64 * w + k]) & (value <= upper[box, 64 * w + k])) << U(k)
                 codes[box, w, lane] = word
-    for box in range(boxes):
-        grow(codes, box, EVERY, stride, 1, words, count)
+        grow(codes, box, EVERY, stride, 1, words_of(values), count)
+
+
+@njit
+def next_word(w: int, near: np.uint64, words: int) -> tuple[int, np.uint64]:
+    """Where the bits that a shift moves into a word come from, and a mask of none where there are none."""
+    if near == NONE or w + 1 == words:
+        return w, NONE
+    return w + 1, ALL
 
 
 @njit
 def shift(signals: Words, slot: int, how: int, bits: int, words: int, count: int) -> None:
-    """Combine a signal with itself some bits later: by minimum (EVERY), by maximum (SOME), or by replacement."""
+    """Replace a signal by the minimum or maximum of it and itself some bits later."""
     far, near = bits // 64, U(bits % 64)
     for w in range(words - far):
         source = w + far
-        alone = near == NONE or source + 1 == words
-        after, keep = (source, NONE) if alone else (source + 1, ALL)
+        after, keep = next_word(source, near, words)
         rest = U(63) & (U(64) - near)
         for lane in range(count):
             later = (signals[slot, source, lane] >> near) | ((signals[slot, after, lane] << rest) & keep)
             if how == EVERY:
                 signals[slot, w, lane] &= later
-            elif how == SOME:
-                signals[slot, w, lane] |= later
             else:
-                signals[slot, w, lane] = later
+                signals[slot, w, lane] |= later
 
 
 @njit
@@ -110,16 +116,13 @@ def below(bits: int) -> np.uint64:
 
 
 @njit
-def one_window(
-    signals: Words, slot: int, how: int, start: int, width: int, stride: int, pattern: Words, count: int
-) -> None:
+def one_window(signals: Words, slot: int, how: int, width: int, stride: int, pattern: Words, count: int) -> None:
     """Replace a signal by the minimum or maximum of one window, as the first bit of its first word."""
-    begin, end = start * stride, (start + width - 1) * stride + 1
-    low = begin // 64
+    end = (width - 1) * stride + 1
     flip = ALL if how == EVERY else NONE
-    for w in range(low, words_of(end)):
-        mask = pattern[w] & below(end - 64 * w) & ~below(begin - 64 * w)
-        so_far = ALL if w > low else NONE
+    for w in range(words_of(end)):
+        mask = pattern[w] & below(end - 64 * w)
+        so_far = ALL if w > 0 else NONE
         for lane in range(count):
             found = (signals[slot, w, lane] ^ flip) & mask
             signals[slot, 0, lane] = found | (signals[slot, 0, lane] & so_far)
@@ -128,31 +131,28 @@ def one_window(
 
 
 @njit
-def load(
-    signals: Words,
-    slot: int,
-    codes: Words,
-    box: int,
-    complemented: bool,
-    words: int,
-    valid: NDArray[np.int64],
-    fill: np.uint64,
-    whole: bool,
-    count: int,
+def load(signals: Words, slot: int, codes: Words, box: int, bits: int, flip: np.uint64, words: int, count: int) -> None:
+    """Push the signal of a box from a bit of its codes on, flipped or not; what lies past the codes means nothing."""
+    far, near = bits // 64, U(bits % 64)
+    have = codes.shape[1]
+    for w in range(min(words, have - far)):
+        source = w + far
+        after, keep = next_word(source, near, have)
+        rest = U(63) & (U(64) - near)
+        for lane in range(count):
+            later = (codes[box, source, lane] >> near) | ((codes[box, after, lane] << rest) & keep)
+            signals[slot, w, lane] = later ^ flip
+
+
+@njit
+def cut(
+    signals: Words, slot: int, ends: NDArray[np.int64], begin: int, fill: np.uint64, words: int, count: int
 ) -> None:
-    """Push the signal of a box or its complement, with the filling where a trajectory has ended."""
-    flip = ALL if complemented else NONE
-    known = min(words, codes.shape[1])
-    for w in range(known):
-        if whole:
-            for lane in range(count):
-                signals[slot, w, lane] = codes[box, w, lane] ^ flip
-        else:
-            for lane in range(count):
-                mask = below(valid[lane] - 64 * w)
-                signals[slot, w, lane] = ((codes[box, w, lane] ^ flip) & mask) | (fill & ~mask)
-    for w in range(known, words):
-        signals[slot, w, :count] = fill
+    """Put the filling where a trajectory has ended; `ends` and `begin` are in bits."""
+    for w in range(words):
+        for lane in range(count):
+            mask = below(ends[lane] - begin - 64 * w)
+            signals[slot, w, lane] = (signals[slot, w, lane] & mask) | (fill & ~mask)
 
 
 @njit
@@ -160,8 +160,9 @@ def evaluate(
     code: NDArray[np.int64],
     stride: int,
     pattern: Words,
+    spans: NDArray[np.int64],
     codes: Words,
-    valid: NDArray[np.int64],
+    ends: NDArray[np.int64],
     fill: np.uint64,
     whole: bool,
     signals: Words,
@@ -173,8 +174,9 @@ def evaluate(
         code: The program.
         stride: The bits of a tick.
         pattern: The first bit of every tick, shape (words,).
+        spans: The first tick of each box in the codes, and how many, shape (boxes, 2).
         codes: From `encode`, shape (boxes, words, at least count).
-        valid: The bits that come from data, shape (at least count,).
+        ends: The bits of each trajectory, shape (at least count,).
         fill: What unknown predicates are taken for: no bits or all.
         whole: Whether no trajectory ends within the horizon.
         signals: The stack, shape (depth, words, at least count).
@@ -184,9 +186,12 @@ def evaluate(
     for i in range(len(code)):
         operation, first, second, ticks = code[i]
         words = words_of(ticks * stride)
-        if operation == LITERAL:
+        if operation in (INSIDE, OUTSIDE):
             top += 1
-            load(signals, top, codes, first, second == 1, words, valid, fill, whole, count)
+            later = (second - spans[first, 0]) * stride
+            load(signals, top, codes, first, later, ALL if operation == OUTSIDE else NONE, words, count)
+            if not whole:
+                cut(signals, top, ends, second * stride, fill, words, count)
         elif operation == CONSTANT:
             top += 1
             signals[top, :words, :count] = ALL if first else NONE
@@ -199,41 +204,39 @@ def evaluate(
                     else:
                         signals[top, w, lane] |= signals[top + 1, w, lane]
         elif ticks == 1:
-            one_window(signals, top, operation, first, second, stride, pattern, count)
+            one_window(signals, top, operation, first, stride, pattern, count)
         else:
-            words = words_of((ticks + first + second - 1) * stride)
-            if first > 0:
-                shift(signals, top, MOVE, first * stride, words, count)
-                words = words_of((ticks + second - 1) * stride)
-            grow(signals, top, operation, second, stride, words, count)
+            grow(signals, top, operation, first, stride, words_of((ticks + first - 1) * stride), count)
 
 
 @njit
 def verdicts(
     rows: NDArray[np.float64],
     lengths: NDArray[np.int64],
+    answers: NDArray[np.int8],
     stride: int,
     horizon: int,
     code: NDArray[np.int64],
     pattern: Words,
+    spans: NDArray[np.int64],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
     depth: int,
-    answers: NDArray[np.int8],
 ) -> int:
     """The verdicts of a program on trajectories, a block at a time.
 
     Args:
         rows: The values of each trajectory in a row, shape (n, ticks * variables).
         lengths: The number of states of each trajectory, shape (n,).
+        answers: Takes 1, 0 or -1 for each trajectory, shape (n,).
         stride: The number of variables, at least 1.
         horizon: The formula's end-effect time.
         code: The program.
         pattern: The first bit of every tick, shape (words,).
+        spans: The first tick of each box, and how many, shape (boxes, 2).
         lower: The least values inside each box, shape (boxes, values).
         upper: The greatest ones.
         depth: The most signals on the stack.
-        answers: Takes 1, 0 or -1 for each trajectory, shape (n,).
 
     Returns:
         A trajectory that has NaN within its length, where the work stopped; or -1.
@@ -241,7 +244,7 @@ def verdicts(
     lanes = max(8, min(LANES, WORDS // len(pattern), len(rows)))
     codes = np.empty((len(lower), words_of(lower.shape[1]), lanes), dtype=np.uint64)
     signals = np.empty((depth, len(pattern), lanes), dtype=np.uint64)
-    valid = np.empty(lanes, dtype=np.int64)
+    ends = np.empty(lanes, dtype=np.int64)
     for first in range(0, len(rows), lanes):
         count = min(lanes, len(rows) - first)
         shortest = horizon + 1
@@ -250,14 +253,14 @@ def verdicts(
             if has_nan(rows, first + lane, min(length * stride, rows.shape[1])):
                 return first + lane
             shortest = min(shortest, length)
-            valid[lane] = length * stride
-        encode(rows, first, count, stride, lower, upper, codes)
+            ends[lane] = length * stride
+        encode(rows, first, count, stride, spans, lower, upper, codes)
         whole = shortest > horizon
-        evaluate(code, stride, pattern, codes, valid, NONE, whole, signals, count)
+        evaluate(code, stride, pattern, spans, codes, ends, NONE, whole, signals, count)
         for lane in range(count):
             answers[first + lane] = 2 * np.int8(signals[0, 0, lane] & U(1)) - 1
         if not whole:
-            evaluate(code, stride, pattern, codes, valid, ALL, whole, signals, count)
+            evaluate(code, stride, pattern, spans, codes, ends, ALL, whole, signals, count)
             for lane in range(count):
                 possible = np.int8(signals[0, 0, lane] & U(1))
                 answers[first + lane] = (answers[first + lane] + 1) // 2 + possible - 1

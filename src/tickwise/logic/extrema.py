@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tickwise._jit import njit
 from tickwise.logic.bits import U, has_nan
-from tickwise.logic.program import BOTH, CONSTANT, EITHER, EVERY, LITERAL
+from tickwise.logic.program import BOTH, CONSTANT, EITHER, EVERY, INSIDE, OUTSIDE
 
 Signals = NDArray[np.float64]
 LANES = 64  # trajectories at a time: the signals of a block stay in the processor's cache
@@ -25,36 +25,34 @@ def pick(least: bool, a: float, b: float) -> float:
 
 
 @njit
-def sweep(signals: Signals, slot: int, scratch: int, least: bool, start: int, width: int, ticks: int) -> None:
-    """Replace a signal by the extrema of the windows that begin `start` ticks later, for so many ticks."""
+def sweep(signals: Signals, slot: int, scratch: int, least: bool, width: int, ticks: int) -> None:
+    """Replace a signal by the extrema of the windows that begin at so many ticks."""
     lanes = signals.shape[2]
     last = ticks + width - 1
     for t in range(last):
         for lane in range(lanes):
-            value = signals[slot, U(start + t), lane]
+            value = signals[slot, t, lane]
             if t % width == 0:
                 signals[scratch, t, lane] = value
             else:
                 signals[scratch, t, lane] = pick(least, signals[scratch, t - 1, lane], value)
     for t in range(last - 2, -1, -1):
         if (t + 1) % width > 0:
-            now, after = U(start + t), U(start + t + 1)
             for lane in range(lanes):
-                signals[slot, now, lane] = pick(least, signals[slot, now, lane], signals[slot, after, lane])
+                signals[slot, t, lane] = pick(least, signals[slot, t, lane], signals[slot, t + 1, lane])
     for t in range(ticks):
-        now, end = U(start + t), U(t + width - 1)
+        end = t + width - 1
         for lane in range(lanes):
-            signals[slot, t, lane] = pick(least, signals[slot, now, lane], signals[scratch, end, lane])
+            signals[slot, t, lane] = pick(least, signals[slot, t, lane], signals[scratch, end, lane])
 
 
 @njit
-def one_window(signals: Signals, slot: int, least: bool, start: int, width: int) -> None:
+def one_window(signals: Signals, slot: int, least: bool, width: int) -> None:
     """Replace a signal by the extremum of one window."""
     lanes = signals.shape[2]
-    for t in range(start, start + width):
+    for t in range(1, width):
         for lane in range(lanes):
-            value = signals[slot, U(t), lane]
-            signals[slot, 0, lane] = value if t == start else pick(least, signals[slot, 0, lane], value)
+            signals[slot, 0, lane] = pick(least, signals[slot, 0, lane], signals[slot, t, lane])
 
 
 @njit
@@ -64,11 +62,12 @@ def load(
     columns: Signals,
     sides: NDArray[np.float64],
     box: int,
+    begin: int,
     complemented: bool,
     stride: int,
     ticks: int,
 ) -> None:
-    """Push the distance to the sides of a box, or to those of its complement, at so many ticks of the data."""
+    """Push the distance to the sides of a box, or to those of its complement, at some ticks of the data."""
     lanes = signals.shape[2]
     signals[slot, :ticks] = -np.inf if complemented else np.inf
     for side in range(len(sides)):
@@ -78,18 +77,20 @@ def load(
         sign = -sides[side, 3] if complemented else sides[side, 3]
         offset = sign * sides[side, 2]  # so a distance of 0 has no minus sign
         for t in range(ticks):
-            row = U(t * stride) + column
+            row = U((begin + t) * stride) + column
             for lane in range(lanes):
                 distance = sign * columns[row, lane] - offset
                 signals[slot, t, lane] = pick(not complemented, signals[slot, t, lane], distance)
 
 
 @njit
-def cut(signals: Signals, slot: int, lengths: NDArray[np.int64], fill: float, known: int, ticks: int) -> None:
+def cut(
+    signals: Signals, slot: int, lengths: NDArray[np.int64], begin: int, fill: float, known: int, ticks: int
+) -> None:
     """Put the filling where a trajectory has ended."""
     for t in range(ticks):
         for lane in range(signals.shape[2]):
-            if t >= known or t >= lengths[lane]:
+            if t >= known or begin + t >= lengths[lane]:
                 signals[slot, t, lane] = fill
 
 
@@ -120,12 +121,12 @@ def evaluate(
     top = -1
     for i in range(len(code)):
         operation, first, second, ticks = code[i]
-        if operation == LITERAL:
+        if operation in (INSIDE, OUTSIDE):
             top += 1
-            known = min(ticks, len(columns) // stride)
-            load(signals, top, columns, sides, first, second == 1, stride, known)
+            known = min(ticks, len(columns) // stride - second)
+            load(signals, top, columns, sides, first, second, operation == OUTSIDE, stride, known)
             if not whole:
-                cut(signals, top, lengths, fill, known, ticks)
+                cut(signals, top, lengths, second, fill, known, ticks)
         elif operation == CONSTANT:
             top += 1
             signals[top, :ticks] = np.inf if first else -np.inf
@@ -135,15 +136,17 @@ def evaluate(
                 for lane in range(lanes):
                     signals[top, t, lane] = pick(operation == BOTH, signals[top, t, lane], signals[top + 1, t, lane])
         elif ticks == 1:
-            one_window(signals, top, operation == EVERY, first, second)
+            one_window(signals, top, operation == EVERY, first)
         else:
-            sweep(signals, top, scratch, operation == EVERY, first, second, ticks)
+            sweep(signals, top, scratch, operation == EVERY, first, ticks)
 
 
 @njit
 def robustness(
     rows: NDArray[np.float64],
     lengths: NDArray[np.int64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
     stride: int,
     horizon: int,
     ticks: int,
@@ -151,14 +154,14 @@ def robustness(
     sides: NDArray[np.float64],
     depth: int,
     reach: int,
-    lower: NDArray[np.float64],
-    upper: NDArray[np.float64],
 ) -> int:
     """Both ends of the robustness of a program on trajectories, a block at a time.
 
     Args:
         rows: The values of each trajectory in a row, shape (n, ticks * variables).
         lengths: The number of states of each trajectory, shape (n,).
+        lower: Takes the lower ends, shape (n,).
+        upper: Takes the upper ends, shape (n,).
         stride: The number of variables, at least 1.
         horizon: The formula's end-effect time.
         ticks: How many of the first ticks matter.
@@ -166,8 +169,6 @@ def robustness(
         sides: The sides of the boxes.
         depth: The most signals on the stack.
         reach: The most ticks of a signal.
-        lower: Takes the lower ends, shape (n,).
-        upper: Takes the upper ends, shape (n,).
 
     Returns:
         A trajectory that has NaN within its length, where the work stopped; or -1.

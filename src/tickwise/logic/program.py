@@ -5,8 +5,9 @@ maxima, so that each end of what is unknown can be followed by itself: a formula
 gives true with all unknown predicates false, and possibly true where it does with all of them true. Likewise the
 ends of the robustness come from -inf and inf.
 
-The program runs on a stack of signals. A signal is made for the ticks that are asked of it only: one at the root,
-and ``count + end`` below an operator over [start, end].
+The program runs on a stack of signals. A signal is made for the ticks that are asked of it only: tick 0 at the root,
+and ``begin + start`` to ``last + end`` below an operator over [start, end]. So a signal's first number is that of
+its first tick asked for, and windows start there.
 """
 
 from __future__ import annotations
@@ -14,15 +15,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.logic.syntax import Always, And, Box, Constant, Eventually, Formula, Not, Or
 
-LITERAL, CONSTANT, BOTH, EITHER, EVERY, SOME = range(6)
-"""Push a box or its complement (box, complemented); push true or false (value, -); replace the two topmost signals
-by their minimum or maximum (-, -); replace the topmost by the minimum or maximum of its windows (start, width)."""
+INSIDE, OUTSIDE, CONSTANT, BOTH, EITHER, EVERY, SOME = range(7)
+"""Push a box or its complement (box, first tick); push true or false (value, -); replace the two topmost signals by
+their minimum or maximum (-, -); replace the topmost by the minima or maxima of its windows (width, -)."""
+
+
+ROUND = 8
+"""Comparisons go on to a multiple of this number where the data does: vectors are of that many values."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,12 +41,13 @@ class Program:
         ticks: How many of the first ticks of the data matter.
         horizon: The formula's end-effect time: a trajectory with that tick leaves nothing unknown.
         code: An instruction a row: operation, two operands, and the ticks of the resulting signal; int64.
+        spans: The first tick of the data at which each box is asked for, and how many ticks, shape (boxes, 2).
         depth: The most signals on the stack.
         reach: The most ticks of a signal.
         pattern: The signal that is true at every tick, as words with a bit for each variable, of which the first of
             each tick is set; long enough for every signal.
-        lower: The least number that is inside of each box for each value of a trajectory, shape (boxes, ticks *
-            variables), -inf on open sides; strict sides are moved to the next number.
+        lower: The least number inside of each box for each value of the ticks asked for, shape (boxes, values), -inf
+            on open sides; strict sides are moved to the next number.
         upper: The greatest ones.
         sides: Rows (box, column, bound, sign); the distance to a side is sign * (value - bound).
     """
@@ -50,6 +57,7 @@ class Program:
     ticks: int
     horizon: int
     code: NDArray[np.int64]
+    spans: NDArray[np.int64]
     depth: int
     reach: int
     pattern: NDArray[np.uint64]
@@ -61,6 +69,16 @@ class Program:
     def stride(self) -> int:
         """The bits that a tick takes."""
         return max(1, len(self.variables))
+
+    @property
+    def for_verdicts(self) -> tuple[Any, ...]:
+        """What `bits.verdicts` takes of it."""
+        return (self.stride, self.horizon, self.code, self.pattern, self.spans, self.lower, self.upper, self.depth)
+
+    @property
+    def for_robustness(self) -> tuple[Any, ...]:
+        """What `extrema.robustness` takes of it."""
+        return (self.stride, self.horizon, self.ticks, self.code, self.sides, self.depth, self.reach)
 
 
 @lru_cache(maxsize=256)
@@ -74,21 +92,24 @@ def program(formula: Formula, ticks: int) -> Program:
     Raises:
         TypeError: If a node is none of this library's.
     """
-    writer = _Writer(ticks)
-    writer.write(formula, 1, complemented=False)
-    horizon, variables, boxes = formula.end_effect, formula.variables, tuple(writer.boxes)
-    ticks = min(ticks, horizon + 1)
+    horizon, variables = formula.end_effect, formula.variables
+    writer = _Writer(min(ticks, horizon + 1))
+    writer.write(formula, 0, 1, complemented=False)
+    boxes, stride = tuple(writer.boxes), max(1, len(variables))
+    spans = np.array([(first, end - first) for first, end in writer.boxes.values()], dtype=np.int64).reshape(-1, 2)
     reach = max(count for *_, count in writer.code)
-    lower, upper = (np.tile(ends, ticks) for ends in _closed(boxes, variables))
+    values = -(-int(spans[:, 1].max(initial=0)) * stride // ROUND) * ROUND
+    lower, upper = (np.tile(ends, values)[:, :values].copy() for ends in _closed(boxes, variables))
     return Program(
         variables=variables,
         boxes=boxes,
-        ticks=ticks,
+        ticks=writer.ticks,
         horizon=horizon,
         code=np.array(writer.code, dtype=np.int64),
+        spans=spans,
         depth=writer.depth,
         reach=reach,
-        pattern=_pattern(reach, max(1, len(variables))),
+        pattern=_pattern(reach, stride),
         lower=lower,
         upper=upper,
         sides=_sides(boxes, variables),
@@ -100,41 +121,47 @@ class _Writer:
 
     def __init__(self, ticks: int) -> None:
         self.code: list[tuple[int, int, int, int]] = []
-        self.boxes: dict[Box, int] = {}
+        self.boxes: dict[Box, tuple[int, int]] = {}  # with the ticks asked for: the first and the one after the last
         self.depth = 0
-        self._ticks = ticks
+        self.ticks = ticks
         self._height = 0
 
-    def write(self, node: Formula, count: int, *, complemented: bool) -> None:
-        """Push a formula's signal, or that of its negation, at ticks 0 to count - 1."""
+    def write(self, node: Formula, begin: int, count: int, *, complemented: bool) -> None:
+        """Push a formula's signal, or that of its negation, at ticks begin to begin + count - 1."""
         match node:
             case Box():
-                self._push(LITERAL, self.boxes.setdefault(node, len(self.boxes)), complemented, count)
+                self._box(node, begin, count, complemented=complemented)
             case Constant(value):
-                self._push(CONSTANT, value != complemented, 0, count)
+                self._push(CONSTANT, int(value != complemented), 0, count)
             case Not(operand):
-                self.write(operand, count, complemented=not complemented)
+                self.write(operand, begin, count, complemented=not complemented)
             case And(operands) | Or(operands):
-                least = isinstance(node, And) != complemented
+                operation = BOTH if isinstance(node, And) != complemented else EITHER
                 for i, operand in enumerate(operands):
-                    self.write(operand, count, complemented=complemented)
+                    self.write(operand, begin, count, complemented=complemented)
                     if i > 0:
                         self._height -= 1
-                        self.code.append((BOTH if least else EITHER, 0, 0, count))
+                        self.code.append((operation, 0, 0, count))
             case Eventually(interval, operand) | Always(interval, operand):
                 # all ticks past the data are alike, so that windows may be cut there
-                start, end = min(interval.start, self._ticks), min(interval.end, self._ticks)
-                self.write(operand, count + end, complemented=complemented)
-                least = isinstance(node, Always) != complemented
-                if end > 0:
-                    self.code.append((EVERY if least else SOME, start, end - start + 1, count))
+                start, end = min(interval.start, self.ticks), min(interval.end, self.ticks)
+                self.write(operand, min(begin + start, self.ticks), count + end - start, complemented=complemented)
+                operation = EVERY if isinstance(node, Always) != complemented else SOME
+                if end > start:
+                    self.code.append((operation, end - start + 1, 0, count))
             case _:
                 raise TypeError(f"{type(node).__name__} is not a formula node of this library")
+
+    def _box(self, box: Box, begin: int, count: int, *, complemented: bool) -> None:
+        first, end = self.boxes.get(box, (begin, begin))
+        self.boxes[box] = min(first, begin), max(end, min(begin + count, self.ticks))
+        which = list(self.boxes).index(box)
+        self._push(OUTSIDE if complemented else INSIDE, which, begin, count)
 
     def _push(self, operation: int, first: int, second: int, count: int) -> None:
         self._height += 1
         self.depth = max(self.depth, self._height)
-        self.code.append((operation, int(first), int(second), count))
+        self.code.append((operation, first, second, count))
 
 
 def _pattern(ticks: int, stride: int) -> NDArray[np.uint64]:

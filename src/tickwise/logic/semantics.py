@@ -135,8 +135,7 @@ def _verdicts(compiled: Program, batch: Batch) -> NDArray[np.int8]:
     from tickwise.logic import bits  # compiled code is loaded when it is first needed
 
     answers = np.empty(len(batch.values), dtype=np.int8)
-    rest = compiled.code, compiled.pattern, compiled.lower, compiled.upper, compiled.depth, answers
-    bad = bits.verdicts(_rows(batch), batch.lengths, compiled.stride, compiled.horizon, *rest)
+    bad = bits.verdicts(_rows(batch), batch.lengths, answers, *compiled.for_verdicts)
     if bad >= 0:
         require_no_nan(batch, compiled.variables)
     return answers
@@ -147,8 +146,7 @@ def _robustness(compiled: Program, batch: Batch) -> tuple[NDArray[np.float64], N
     from tickwise.logic import extrema
 
     ends = np.empty((2, len(batch.values)))
-    rest = compiled.ticks, compiled.code, compiled.sides, compiled.depth, compiled.reach, *ends
-    bad = extrema.robustness(_rows(batch), batch.lengths, compiled.stride, compiled.horizon, *rest)
+    bad = extrema.robustness(_rows(batch), batch.lengths, *ends, *compiled.for_robustness)
     if bad >= 0:
         require_no_nan(batch, compiled.variables)
     return ends[0], ends[1]
