@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from importlib.util import find_spec
 
 import numpy as np
@@ -101,6 +102,28 @@ def test_nan_is_found_wherever_it_lies_within_a_length(method: str, order: str) 
     values[599, 79, 1] = math.nan
     with pytest.raises(DataError, match=r"^trajectory 599 has NaN at tick 79 in 'y'; fill it, leave it out, or set"):
         getattr(phi, method)(values, **options)
+
+
+@pytest.mark.parametrize("method", ["verdict", "robustness"])
+def test_many_trajectories_are_not_copied(method: str) -> None:
+    phi = parse("F[1,15] G[0,4] (3 <= x <= 4) & F[21,39] (5 <= y <= 8)")
+    values = random_trajectories(0, 20_000, 41, len(VARIABLES))
+    getattr(phi, method)(values[:1])  # loads the compiled code
+    tracemalloc.start()
+    getattr(phi, method)(values)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < values.nbytes / 10
+
+
+@given(formulas(), st.integers(0, 2**32 - 1))
+def test_infinite_values_are_values_too(phi: Formula, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    values = random_trajectories(seed, 5, 12, len(VARIABLES))
+    values[rng.random(values.shape) < 0.2] = math.inf
+    values[rng.random(values.shape) < 0.2] = -math.inf
+    states = [states_of(one, 12) for one in values]
+    assert verdict(phi, values, variables=VARIABLES).tolist() == [verdict_twin(phi, one) for one in states]  # type: ignore[union-attr]
 
 
 @settings(max_examples=100)

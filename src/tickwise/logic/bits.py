@@ -16,6 +16,7 @@ from tickwise.logic.program import BOTH, CONSTANT, EITHER, EVERY, INSIDE, OUTSID
 Words = NDArray[np.uint64]
 U = np.uint64
 NONE, ALL = U(0), U(0xFFFF_FFFF_FFFF_FFFF)
+BITS = U(1) << np.arange(64, dtype=np.uint64)
 LANES = 256  # trajectories at a time: the signals of a block stay in the processor's cache
 WORDS = 4096
 
@@ -69,7 +70,8 @@ def encode(
                 column, word = U(begin + 64 * w), NONE
                 for k in range(min(64, values - 64 * w)):
                     value = rows[row, column + U(k)]
-                    word |= U((value >= lower[box, 64 * w + k]) & (value <= upper[box, 64 * w + k])) << U(k)
+                    within = (value >= lower[box, 64 * w + k]) & (value <= upper[box, 64 * w + k])
+                    word |= BITS[k] if within else NONE
                 codes[box, w, lane] = word
         grow(codes, box, EVERY, stride, 1, words_of(values), count)
 

@@ -82,6 +82,12 @@ class Program:
 
 
 @lru_cache(maxsize=256)
+def variables_of(formula: Formula) -> tuple[str, ...]:
+    """A formula's variables, collected once."""
+    return formula.variables
+
+
+@lru_cache(maxsize=256)
 def program(formula: Formula, ticks: int) -> Program:
     """Compile a formula for trajectories of at most so many ticks.
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from tickwise.errors import UnknownVariableError
 from tickwise.logic.batch import Batch, Trajectories, arranged, as_batch, require_no_nan
-from tickwise.logic.program import Program, program
+from tickwise.logic.program import Program, program, variables_of
 from tickwise.logic.syntax import Box, Formula, Not, Verdict
 
 __all__ = ["Batch", "Trajectories", "as_batch", "holds", "robustness", "verdict"]
@@ -49,7 +49,7 @@ def verdict(
         UnknownVariableError: If the formula names a variable that the data does not have.
         DataError: If the trajectories are malformed; see `as_batch`.
     """
-    batch = arranged(X, formula.variables, variables=variables, lengths=lengths)
+    batch = arranged(X, variables_of(formula), variables=variables, lengths=lengths)
     answers = _verdicts(program(formula, batch.values.shape[1]), batch)
     return Verdict(int(answers[0])) if batch.single else answers
 
@@ -82,7 +82,7 @@ def robustness(
         UnknownVariableError: If the formula names a variable that the data does not have.
         DataError: If the trajectories are malformed; see `as_batch`.
     """
-    batch = arranged(X, formula.variables, variables=variables, lengths=lengths)
+    batch = arranged(X, variables_of(formula), variables=variables, lengths=lengths)
     compiled = program(formula, batch.values.shape[1])
     answers, upper = _robustness(compiled, batch)
     if batch.lengths.min(initial=formula.end_effect + 1) <= formula.end_effect:
