@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from tests.logic.twins import State, robustness_twin, signal_twin, verdict_twin
-from tests.strategies import VARIABLES, batches, formulas, predicates, primitives, random_trajectories, sdnfs
+from tests.strategies import VARIABLES, batches, formulas, intervals, predicates, primitives, random_trajectories, sdnfs
 from tickwise.errors import DataError, UnknownVariableError
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import Primitive
@@ -57,11 +57,15 @@ def test_robustness_agrees_with_the_twin_and_with_the_verdict(phi: Formula, batc
                 assert math.isnan(answer)
 
 
-LONG = formulas(("x", "y", "z"), longest=90, max_leaves=4)
+@st.composite
+def long_formulas(draw: st.DrawFn) -> Formula:
+    """Long windows; at times every box is asked for again, at other ticks."""
+    phi = draw(formulas(("x", "y", "z"), longest=90, max_leaves=4))
+    return draw(st.sampled_from((phi, And((phi, Not(Eventually(draw(intervals(70)), phi)))))))
 
 
 @settings(max_examples=150, deadline=None)
-@given(LONG, batches(3, most=3, longest=150))
+@given(long_formulas(), batches(3, most=3, longest=150))
 def test_words_of_many_ticks_agree_with_the_signals_of_the_twin(phi: Formula, batch: Ragged) -> None:
     """Signals and windows longer than a word, shifts by whole words, and windows beyond the data."""
     values, lengths = batch
@@ -238,6 +242,9 @@ def test_a_horizon_far_beyond_the_data_costs_nothing() -> None:
     phi = parse("F[0,1000000000] G[5,2000000000] (x >= 0) & G[1000000000,3000000000] (x >= 0)")
     assert phi.verdict(X) is Verdict.UNKNOWN
     assert parse("F[3,1000000000] (x <= 2)").verdict(X) is Verdict.TRUE
+    beyond = parse(f"G[{10**30},{10**40}] (x >= 0) | F[3,{10**50}] (x <= 2)")
+    assert beyond.verdict(X) is Verdict.TRUE
+    assert beyond.robustness(X) == 0.0
 
 
 def test_a_foreign_node_is_refused() -> None:

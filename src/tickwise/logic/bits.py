@@ -17,8 +17,11 @@ Words = NDArray[np.uint64]
 U = np.uint64
 NONE, ALL = U(0), U(0xFFFF_FFFF_FFFF_FFFF)
 BITS = U(1) << np.arange(64, dtype=np.uint64)
-LANES = 256  # trajectories at a time: the signals of a block stay in the processor's cache
+LANES = 256
+"""The most trajectories of a block."""
+
 WORDS = 4096
+"""The most words of a block's signal, so that all of its signals stay in the processor's cache."""
 
 
 @njit

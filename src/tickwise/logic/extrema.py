@@ -14,8 +14,11 @@ from tickwise.logic.bits import U, has_nan
 from tickwise.logic.program import BOTH, CONSTANT, EITHER, EVERY, INSIDE, OUTSIDE
 
 Signals = NDArray[np.float64]
-LANES = 64  # trajectories at a time: the signals of a block stay in the processor's cache
-TICKS = 16384
+LANES = 64
+"""The most trajectories of a block."""
+
+NUMBERS = 16384
+"""The most numbers of a block's signal, so that all of its signals stay in the processor's cache."""
 
 
 @njit
@@ -173,7 +176,7 @@ def robustness(
     Returns:
         A trajectory that has NaN within its length, where the work stopped; or -1.
     """
-    lanes = max(8, min(LANES, TICKS // reach, len(rows)))
+    lanes = max(8, min(LANES, NUMBERS // reach, len(rows)))
     values = min(ticks * stride, rows.shape[1])
     columns = np.zeros((values, lanes))
     signals = np.empty((depth + 1, reach, lanes))

@@ -26,9 +26,11 @@ INSIDE, OUTSIDE, CONSTANT, BOTH, EITHER, EVERY, SOME = range(7)
 """Push a box or its complement (box, first tick); push true or false (value, -); replace the two topmost signals by
 their minimum or maximum (-, -); replace the topmost by the minima or maxima of its windows (width, -)."""
 
-
 ROUND = 8
 """Comparisons go on to a multiple of this number where the data does: vectors are of that many values."""
+
+FAR = 2**62
+"""A horizon beyond all data, however far a formula's own may be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +41,7 @@ class Program:
         variables: The names of the data's columns.
         boxes: The distinct boxes of the formula.
         ticks: How many of the first ticks of the data matter.
-        horizon: The formula's end-effect time: a trajectory with that tick leaves nothing unknown.
+        horizon: The formula's end-effect time, at most `FAR`: a trajectory with that tick leaves nothing unknown.
         code: An instruction a row: operation, two operands, and the ticks of the resulting signal; int64.
         spans: The first tick of the data at which each box is asked for, and how many ticks, shape (boxes, 2).
         depth: The most signals on the stack.
@@ -105,12 +107,12 @@ def program(formula: Formula, ticks: int) -> Program:
     spans = np.array([(first, end - first) for first, end in writer.boxes.values()], dtype=np.int64).reshape(-1, 2)
     reach = max(count for *_, count in writer.code)
     values = -(-int(spans[:, 1].max(initial=0)) * stride // ROUND) * ROUND
-    lower, upper = (np.tile(ends, values)[:, :values].copy() for ends in _closed(boxes, variables))
+    lower, upper = (np.tile(ends, -(-values // stride))[:, :values].copy() for ends in _closed(boxes, variables))
     return Program(
         variables=variables,
         boxes=boxes,
         ticks=writer.ticks,
-        horizon=horizon,
+        horizon=min(horizon, FAR),
         code=np.array(writer.code, dtype=np.int64),
         spans=spans,
         depth=writer.depth,

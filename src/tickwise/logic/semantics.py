@@ -85,7 +85,7 @@ def robustness(
     batch = arranged(X, variables_of(formula), variables=variables, lengths=lengths)
     compiled = program(formula, batch.values.shape[1])
     answers, upper = _robustness(compiled, batch)
-    if batch.lengths.min(initial=formula.end_effect + 1) <= formula.end_effect:
+    if batch.lengths.min(initial=compiled.horizon + 1) <= compiled.horizon:
         # the numbers alone do not tell what is unknown where an end is 0
         verdicts = _verdicts(compiled, batch)
         answers = np.select([verdicts > 0, verdicts < 0], [answers, upper], math.nan)
