@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import tracemalloc
 from importlib.util import find_spec
 
 import numpy as np
@@ -10,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from tests.logic.twins import State, robustness_twin, verdict_twin
-from tests.strategies import VARIABLES, batches, formulas, predicates, primitives, random_trajectories, sdnfs
-from tickwise.errors import UnknownVariableError
+from tests.logic.twins import State, robustness_twin, signal_twin, verdict_twin
+from tests.strategies import VARIABLES, batches, formulas, intervals, predicates, primitives, random_trajectories, sdnfs
+from tickwise.errors import DataError, UnknownVariableError
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import Primitive
-from tickwise.logic.semantics import holds, robustness, sliding, verdict
+from tickwise.logic.semantics import holds, robustness, verdict
 from tickwise.logic.syntax import Always, And, Bound, Box, Constant, Eventually, Formula, Not, Or, Verdict
 
 Ragged = tuple[NDArray[np.float64], NDArray[np.int64]]
@@ -54,6 +55,79 @@ def test_robustness_agrees_with_the_twin_and_with_the_verdict(phi: Formula, batc
                 assert answer <= 0
             case 0:
                 assert math.isnan(answer)
+
+
+@st.composite
+def long_formulas(draw: st.DrawFn) -> Formula:
+    """Long windows; at times every box is asked for again, at other ticks."""
+    phi = draw(formulas(("x", "y", "z"), longest=90, max_leaves=4))
+    return draw(st.sampled_from((phi, And((phi, Not(Eventually(draw(intervals(70)), phi)))))))
+
+
+@settings(max_examples=150, deadline=None)
+@given(long_formulas(), batches(3, most=3, longest=150))
+def test_words_of_many_ticks_agree_with_the_signals_of_the_twin(phi: Formula, batch: Ragged) -> None:
+    """Signals and windows longer than a word, shifts by whole words, and windows beyond the data."""
+    values, lengths = batch
+    options = {"variables": ("x", "y", "z"), "lengths": lengths}
+    expected = np.array([signal_twin(phi, one[:length]) for one, length in zip(values, lengths, strict=True)])
+    verdicts = verdict(phi, values, **options)
+    np.testing.assert_array_equal(verdicts, expected[:, 0])
+    answers = np.select([expected[:, 0] > 0, expected[:, 0] < 0], [expected[:, 1], expected[:, 2]], math.nan)
+    np.testing.assert_array_equal(robustness(phi, values, **options), answers)
+
+
+@settings(max_examples=50, deadline=None)
+@given(formulas(), st.sampled_from((1, 7, 8, 9, 63, 64, 65, 255, 256, 257, 600)), st.data())
+def test_answers_do_not_depend_on_how_trajectories_come_together(phi: Formula, count: int, data: st.DataObject) -> None:
+    """Blocks of any size, the last one partly filled, and some trajectories that end early."""
+    values = random_trajectories(data.draw(st.integers(0, 2**32 - 1)), count, 12, len(VARIABLES))
+    lengths = np.full(count, 12)
+    for which in data.draw(st.sets(st.integers(0, count - 1), max_size=3)):
+        lengths[which] = data.draw(st.integers(1, 12))
+    options = {"variables": VARIABLES, "lengths": lengths}
+    few = sorted({0, count // 2, count - 1, *np.flatnonzero(lengths < 12).tolist()})
+    alone = [phi.verdict(values[i, : lengths[i]], variables=VARIABLES) for i in few]
+    assert np.asarray(phi.verdict(values, **options))[few].tolist() == alone
+    numbers = [phi.robustness(values[i, : lengths[i]], variables=VARIABLES) for i in few]
+    np.testing.assert_array_equal(np.asarray(phi.robustness(values, **options))[few], numbers)
+
+
+@pytest.mark.parametrize("method", ["verdict", "robustness"])
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_nan_is_found_wherever_it_lies_within_a_length(method: str, order: str) -> None:
+    phi = parse("F[0,2] (x >= 1) | F[0,1] (y >= 1)")
+    values = np.zeros((600, 80, 2), order=order)
+    lengths = np.full(600, 80)
+    lengths[1] = 4
+    values[1, 4:] = math.nan
+    options = {"variables": VARIABLES, "lengths": lengths}
+    assert np.all(np.asarray(getattr(phi, method)(values, **options)) <= 0)
+    values[599, 79, 1] = math.nan
+    with pytest.raises(DataError, match=r"^trajectory 599 has NaN at tick 79 in 'y'; fill it, leave it out, or set"):
+        getattr(phi, method)(values, **options)
+
+
+@pytest.mark.parametrize("method", ["verdict", "robustness"])
+def test_many_trajectories_are_not_copied(method: str) -> None:
+    phi = parse("F[1,15] G[0,4] (3 <= x <= 4) & F[21,39] (5 <= y <= 8)")
+    values = random_trajectories(0, 20_000, 41, len(VARIABLES))
+    getattr(phi, method)(values[:1])  # loads the compiled code
+    tracemalloc.start()
+    getattr(phi, method)(values)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < values.nbytes / 10
+
+
+@given(formulas(), st.integers(0, 2**32 - 1))
+def test_infinite_values_are_values_too(phi: Formula, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    values = random_trajectories(seed, 5, 12, len(VARIABLES))
+    values[rng.random(values.shape) < 0.2] = math.inf
+    values[rng.random(values.shape) < 0.2] = -math.inf
+    states = [states_of(one, 12) for one in values]
+    assert verdict(phi, values, variables=VARIABLES).tolist() == [verdict_twin(phi, one) for one in states]  # type: ignore[union-attr]
 
 
 @settings(max_examples=100)
@@ -123,15 +197,6 @@ def test_holds_names_an_unknown_variable() -> None:
         holds(Not(Constant(True)), np.zeros((3, 2)), VARIABLES)
 
 
-@given(st.lists(st.integers(-5, 5), min_size=1, max_size=20), st.data())
-def test_sliding_windows(numbers: list[int], data: st.DataObject) -> None:
-    width = data.draw(st.integers(1, len(numbers)))
-    windows = [numbers[start : start + width] for start in range(len(numbers) - width + 1)]
-    signal = np.array(numbers, dtype=np.float64)
-    assert sliding(np.maximum, signal, width).tolist() == [max(window) for window in windows]
-    assert sliding(np.minimum, signal, width).tolist() == [min(window) for window in windows]
-
-
 X = np.array([[0.0], [1.0], [5.0], [2.0]])
 
 
@@ -177,6 +242,9 @@ def test_a_horizon_far_beyond_the_data_costs_nothing() -> None:
     phi = parse("F[0,1000000000] G[5,2000000000] (x >= 0) & G[1000000000,3000000000] (x >= 0)")
     assert phi.verdict(X) is Verdict.UNKNOWN
     assert parse("F[3,1000000000] (x <= 2)").verdict(X) is Verdict.TRUE
+    beyond = parse(f"G[{10**30},{10**40}] (x >= 0) | F[3,{10**50}] (x <= 2)")
+    assert beyond.verdict(X) is Verdict.TRUE
+    assert beyond.robustness(X) == 0.0
 
 
 def test_a_foreign_node_is_refused() -> None:

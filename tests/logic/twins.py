@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tickwise.logic.syntax import Always, And, Box, Constant, Eventually, Formula, Not, Or
 
 State = dict[str, float]
@@ -68,3 +71,28 @@ def robustness_twin(node: Formula, states: Sequence[State], tick: int = 0) -> tu
             pick = max if isinstance(node, Eventually) else min
             return pick(pair[0] for pair in pairs), pick(pair[1] for pair in pairs)
     raise AssertionError(node)
+
+
+def signal_twin(node: Formula, states: NDArray[np.float64]) -> tuple[int, float, float]:
+    """The verdict and both ends of the robustness at tick 0 of one trajectory over x, y and z, tick by tick.
+
+    The same as the two above, with the answers of all ticks of a subformula kept, so that long windows can be tried.
+    """
+    rows = [dict(zip("xyz", row, strict=True)) for row in states.tolist()]
+
+    def answers(node: Formula, count: int) -> list[tuple[int, float, float]]:
+        match node:
+            case Not(operand):
+                return [(-v, -high, -low) for v, low, high in answers(operand, count)]
+            case And(operands) | Or(operands):
+                pick = min if isinstance(node, And) else max
+                signals = zip(*(answers(child, count) for child in operands), strict=True)
+                return [tuple(map(pick, *at_tick)) for at_tick in signals]  # type: ignore[misc]
+            case Eventually(interval, operand) | Always(interval, operand):
+                pick = min if isinstance(node, Always) else max
+                signal = answers(operand, count + interval.end)
+                windows = [signal[tick + interval.start : tick + interval.end + 1] for tick in range(count)]
+                return [tuple(map(pick, zip(*window, strict=True))) for window in windows]  # type: ignore[misc]
+        return [(verdict_twin(node, rows, tick), *robustness_twin(node, rows, tick)) for tick in range(count)]
+
+    return answers(node, 1)[0]

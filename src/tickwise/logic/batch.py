@@ -67,6 +67,19 @@ def as_batch(
         DataError: If the array has a wrong shape or number of columns, is ragged or not numeric, or a
             trajectory is empty or has NaN within its length.
     """
+    batch = arranged(X, names, variables=variables, lengths=lengths)
+    require_no_nan(batch, names)
+    return batch
+
+
+def arranged(
+    X: Trajectories,
+    names: Sequence[str],
+    *,
+    variables: Sequence[str] | None = None,
+    lengths: NDArray[Any] | None = None,
+) -> Batch:
+    """The same as `as_batch`, but for NaN, which is not looked for: a kernel that reads the data finds it too."""
     if _is_list_of_trajectories(X):
         if lengths is not None:
             raise DataError("lengths go with an (n, ticks, variables) array; a list of arrays has its own")
@@ -81,7 +94,6 @@ def as_batch(
                 raise DataError("lengths go with an (n, ticks, variables) array; cut a single one instead")
             values = _trajectory(X if array is None else array, names, variables, "the trajectory")
             batch = Batch(values[None], np.array([len(values)]), single=True)
-    _check_no_nan(batch, names)
     return batch
 
 
@@ -195,7 +207,12 @@ def _rectangular(
     return Batch(values, given.astype(np.int64), single=False)
 
 
-def _check_no_nan(batch: Batch, names: Sequence[str]) -> None:
+def require_no_nan(batch: Batch, names: Sequence[str]) -> None:
+    """Name the first NaN within a trajectory's length.
+
+    Raises:
+        DataError: If there is one.
+    """
     bad = np.isnan(batch.values)
     if not bad.any():
         return
