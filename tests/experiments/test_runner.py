@@ -21,12 +21,12 @@ import tests
 from tests.experiments.tiny import HOPELESS, LONG, TINY
 from tickwise.errors import ConfigurationError, DataError, StoreError, TickwiseError
 from tickwise.experiments import executors
+from tickwise.experiments.executors import default_workers
 from tickwise.experiments.jobs import Job
 from tickwise.experiments.progress import Display
 from tickwise.experiments.runner import (
     Unit,
     available_methods,
-    default_workers,
     planned_jobs,
     run_study,
     run_units,

@@ -100,6 +100,29 @@ class Local:
             pool.shutdown(cancel_futures=True)
 
 
+def executor(workers: int | None, cluster: str | None) -> Executor:
+    """What carries out jobs: a cluster, so many processes, or a process a core.
+
+    Raises:
+        ConfigurationError: If both are named, or one is not possible.
+        TickwiseError: If there cannot be a cluster; see `tickwise.experiments.cluster.Cluster`.
+    """
+    if cluster is None:
+        return Local(default_workers() if workers is None else workers)
+    if workers is not None:
+        raise ConfigurationError("a cluster has its own workers; leave --workers out")
+    from tickwise.experiments.cluster import Cluster
+
+    return Cluster(cluster)
+
+
+def default_workers() -> int:
+    """The number of cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def _run_here(tasks: Sequence[Task], shared: Board) -> Iterator[int]:
     for task in tasks:
         yield _work(task, shared)

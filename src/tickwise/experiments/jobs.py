@@ -231,10 +231,10 @@ def _infer(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outc
     rngs = [generator(spec.seed, spec.name, "infer", what, job.run) for what in ("source", "target", "plain")]
     report(0, len(STEPS))
     _compile_inference()
-    marks = [time.process_time()]
+    marks = [time.thread_time()]
 
     def done(step: str) -> None:
-        marks.append(time.process_time())
+        marks.append(time.thread_time())
         report(STEPS.index(step) + 1, len(STEPS))
 
     found = transfer_structure(source, target, spec.inference, spec.swarm, rngs[0], rngs[1], done)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,13 +89,6 @@ def run_units(units: Sequence[Unit], workers: int | Executor, display: Display) 
             store.sweep()
         raise
     return stores
-
-
-def default_workers() -> int:
-    """The number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def available_methods(spec: StudySpec, store: Store) -> tuple[str, ...]:
