@@ -6,6 +6,7 @@ which version, and that the scheduler was restarted.
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import queue
@@ -323,13 +324,38 @@ def _client(address: str) -> Any:
     for name in ("distributed.client", "distributed.core", "distributed.batched"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
+        scheduler = _resolve(address)
+        _greet(scheduler)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", VersionMismatchWarning)  # `identity` is stricter
-            return Client(_resolve(address), timeout=_ANSWER, set_as_default=False, name="tickwise")
+            return Client(scheduler, timeout=_ANSWER, set_as_default=False, name="tickwise")
     except (OSError, ValueError, RuntimeError, ImportError, TypeError) as error:
         raise ClusterError(
             f"no Dask scheduler answers at {address}; start one with `dask scheduler`, or correct --cluster"
         ) from error
+
+
+def _greet(address: str) -> None:
+    """See that Dask answers: a client would wait for ever for something else that says nothing.
+
+    Raises:
+        OSError: If it does not answer in time.
+    """
+    from distributed.comm import connect
+    from distributed.security import Security
+    from distributed.utils import LoopRunner
+
+    async def greet() -> None:
+        settings = Security().get_connection_args("client")
+        comm = await asyncio.wait_for(connect(address, timeout=_ANSWER, **settings), _ANSWER + 1)
+        comm.abort()
+
+    runner = LoopRunner(asynchronous=False)
+    runner.start()
+    try:
+        runner.run_sync(greet)
+    finally:
+        runner.stop()
 
 
 def _resolve(address: str) -> str:
