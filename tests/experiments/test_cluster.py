@@ -14,6 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,14 @@ from rich.console import Console
 from tests.experiments.clusters import ROOT, Grid, free_port, grid, interrupt, until
 from tests.experiments.test_runner import artefacts
 from tests.experiments.tiny import LONG, TINY
+from tickwise.cli import main
 from tickwise.errors import ClusterError, ConfigurationError, DataError, MissingExtraError, MissingFileError
 from tickwise.experiments import cluster
 from tickwise.experiments.cluster import Cluster
 from tickwise.experiments.executors import Local, executor
 from tickwise.experiments.identity import difference, identity
 from tickwise.experiments.progress import Board, Display
+from tickwise.experiments.remote import GivenUpError
 from tickwise.experiments.runner import run_study
 from tickwise.experiments.study import StudySpec
 
@@ -72,7 +75,7 @@ def test_a_cluster_gives_the_same_bytes_and_tells_how_far_it_is(shared: Grid, fi
     display = Noting()
     there = run(TINY, tmp_path / "run", shared, display)
     assert artefacts(tmp_path / "run") == artefacts(finished)
-    assert there.workers in (1, 2, 3)  # a worker may come late
+    assert there.workers in (1, 2, 3)  # a worker may be late
     assert display.totals["Learn"] == [30_000] * 2 + [20_000] * 6
     assert display.totals["Infer"] == [4, 4]
     assert [line for line in display.lines if "done" in line or "jobs" in line][:2] == [
@@ -105,6 +108,12 @@ def test_another_version_is_refused(shared: Grid, tmp_path: Path, monkeypatch: p
     with pytest.raises(ConfigurationError, match=r"has tickwise \S+ instead of 9\.9"):
         run(TINY, tmp_path / "run", shared)
     assert not (tmp_path / "run" / "artefacts").exists()
+
+
+def test_a_machine_without_tickwise_is_refused(shared: Grid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(cluster, "version", lambda _: metadata.version("no-such-package"))
+    with pytest.raises(ConfigurationError, match=r"the (worker tcp:\S+|scheduler) has no tickwise of version \d"):
+        run(TINY, tmp_path / "run", shared)
 
 
 def test_other_code_of_the_same_version_is_refused(tmp_path: Path):
@@ -168,6 +177,24 @@ def test_who_carries_out_jobs():
     assert isinstance(executor(None, "tcp://host:8786"), Cluster)
     with pytest.raises(ConfigurationError, match="a cluster has its own workers; leave --workers out"):
         executor(3, "tcp://host:8786")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--cluster", "nowhere"), "'nowhere' is no address of a Dask scheduler; use one such as"),
+        (("--cluster", "tcp://h:1", "--workers", "2"), "a cluster has its own workers; leave --workers out"),
+    ],
+)
+@pytest.mark.parametrize("command", [("reproduce", "case1"), ("reproduce", "all"), ("effect", "rate")])
+def test_the_command_line_says_so_in_one_line(
+    command: tuple[str, ...], options: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]
+):
+    assert main([*command, *options]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"error: {message}")
+    assert err.count("\n") == 1
 
 
 def test_without_workers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -250,6 +277,60 @@ def test_a_cluster_lost_for_good_leaves_what_is_finished(
             run(TINY, tmp_path / "run", made)
     run_study(TINY, tmp_path / "run", 1, Display(Console(quiet=True)))
     assert artefacts(tmp_path / "run") == artefacts(finished)
+
+
+@pytest.mark.parametrize("method", ["send", "next", "look"])
+def test_nothing_is_lost_wherever_the_connection_breaks(
+    shared: Grid, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, method: str
+):
+    real = getattr(cluster._Link, method)
+    calls: list[None] = []
+
+    def breaks_at_times(link: Any, *arguments: Any) -> Any:
+        calls.append(None)
+        if len(calls) in (2, 7):
+            raise cluster._LostError
+        return real(link, *arguments)
+
+    monkeypatch.setattr(cluster._Link, method, breaks_at_times)
+    run(TINY, tmp_path / "run", shared)
+    assert artefacts(tmp_path / "run") == artefacts(finished)
+    assert method == "look" or len(calls) > 7
+
+
+def test_a_job_that_is_lost_again_and_again_ends_the_study(
+    shared: Grid, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def breaks(_: Any) -> None:
+        raise cluster._LostError
+
+    monkeypatch.setattr(cluster._Link, "next", breaks)
+    with pytest.raises(
+        ClusterError, match=r"collect in the \w+ task, run \d was sent to the cluster at .* 5 times, and"
+    ):
+        run(TINY, tmp_path / "run", shared)
+
+
+def test_a_job_that_a_worker_gives_back_is_sent_anew(
+    shared: Grid, finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    real, calls = cluster._Link.send, list[None]()
+
+    def given_back(link: Any, task: Any) -> None:
+        calls.append(None)
+        with monkeypatch.context() as patch:
+            if len(calls) in (1, 8):
+                patch.setattr(cluster, "carry_out", gives_back)
+            real(link, task)
+
+    monkeypatch.setattr(cluster._Link, "send", given_back)
+    run(TINY, tmp_path / "run", shared)
+    assert artefacts(tmp_path / "run") == artefacts(finished)
+    assert len(calls) == 16 + 2
+
+
+def gives_back(*_: object) -> None:
+    raise GivenUpError
 
 
 def test_a_job_that_loses_its_workers_is_named(tmp_path: Path):

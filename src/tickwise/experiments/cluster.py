@@ -103,8 +103,8 @@ class _Session:
         self._address = address
         self._say = say
         self._alone: float | None = None  # since when there are no workers
-        self.most = 0
         self.link = _Link(address)
+        self.most = self.link.threads
 
     def run(self, tasks: Sequence[Task], shared: Board) -> Iterator[int]:
         """Carry out tasks; see `Run`."""
@@ -128,7 +128,7 @@ class _Session:
     def _send(self, waiting: deque[Task], tries: Counter[int]) -> None:
         """Give the cluster enough to do, and not all at once: what the jobs need is sent with them."""
         while waiting and len(self.link.sent) < max(_LEAST_SENT, 2 * self.link.threads):
-            task = waiting.popleft()
+            task = waiting[0]
             tries[task.index] += 1
             if tries[task.index] > _MOST_TRIES:
                 raise ClusterError(
@@ -136,6 +136,7 @@ class _Session:
                     f"each time; see the log of its scheduler, then {_AGAIN}"
                 )
             self.link.send(task)
+            waiting.popleft()
 
     def _watch(self) -> None:
         """See to it that there are workers."""
@@ -177,7 +178,7 @@ class _Link:
         self.sent: dict[Any, Task] = {}
         self.threads = 0
         self._done: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._topic = f"tickwise-{uuid4().hex}"
+        self._topic = ""
         self._client = _client(address)
         try:
             self._check_versions()
@@ -187,7 +188,8 @@ class _Link:
             raise
 
     def listen(self, rows: NDArray[np.float64]) -> None:
-        """Let what workers tell of their jobs show in the rows of a board."""
+        """Let what workers tell of the jobs that are sent from now on show in the rows of a board."""
+        self._topic = f"tickwise-{uuid4().hex}"  # what comes late is of other rows
 
         def note(event: tuple[float, dict[str, Any]]) -> None:
             told = event[1]
@@ -254,8 +256,8 @@ class _Link:
         error = future.exception()
         if not isinstance(error, GivenUpError):
             raise _explained(error, task)
-        del self.sent[future]
         self.send(task)
+        del self.sent[future]
 
     def _check_versions(self) -> None:
         """Refuse workers with other versions before they get work; those that come later refuse it themselves."""
@@ -268,7 +270,7 @@ class _Link:
                 found["scheduler"] = error
         ours = identity()
         for where, theirs in found.items():
-            _require(where, {**ours, "tickwise": "no version" if isinstance(theirs, ImportError) else theirs})
+            _require(where, {**ours, "tickwise": theirs} if isinstance(theirs, str) else theirs)
         with _or_lost():
             for where, theirs in self._client.run(identity, on_error="return").items():
                 _require(where, theirs)
@@ -277,7 +279,12 @@ class _Link:
 def _require(where: str, theirs: Any) -> None:
     if isinstance(theirs, OSError):  # a worker that ended in the meantime
         return
-    wrong = f"what cannot be used ({theirs})" if isinstance(theirs, Exception) else difference(theirs, identity())
+    if isinstance(theirs, ImportError):
+        wrong: str | None = f"no tickwise of version {identity()['tickwise']}"
+    elif isinstance(theirs, Exception):
+        wrong = f"no tickwise that works ({theirs})"
+    else:
+        wrong = difference(theirs, identity())
     if wrong is not None:
         what = where if where == "scheduler" else f"worker {where}"
         raise ConfigurationError(f"the {what} has {wrong}; {REMEDY}")
