@@ -7,10 +7,10 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow lint types bench kills lock clean
+.PHONY: help demo test test-slow lint types bench kills cluster-faults lock clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' $(MAKEFILE_LIST) | expand -t 14
+	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' $(MAKEFILE_LIST) | expand -t 18
 
 demo: $(VENV)/.runtime ## reproduce Case Study 1 with few runs, and write its report
 	$(BIN)/tickwise reproduce case1 --quick --out runs/case1-quick
@@ -33,6 +33,9 @@ bench: $(VENV)/.runtime ## compare the learning loop with C
 
 kills: $(VENV)/.runtime ## kill a reproduction a hundred times, and compare with one left alone
 	$(BIN)/python benchmarks/kills.py
+
+cluster-faults: $(VENV)/.development ## break a Dask cluster that reproduces a study, and compare with one left alone
+	$(BIN)/python benchmarks/cluster.py
 
 # The stamps say that an environment holds what a lock file names.
 $(VENV)/.created:

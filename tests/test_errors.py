@@ -18,6 +18,7 @@ BUILTINS = {
     "StoreError": OSError,
     "NotTransferableError": RuntimeError,
     "MissingExtraError": ImportError,
+    "ClusterError": ConnectionError,
 }
 """The builtin that one would catch, for each error."""
 

@@ -34,6 +34,7 @@ CONFINED = {
     "lark": ("logic/parse.py",),
     "gymnasium": ("envs/",),
     "matplotlib": ("experiments/figures/",),
+    "distributed": ("experiments/cluster.py", "experiments/remote.py"),
     "typer": ("cli.py",),
     "rich": ("cli.py", "experiments/progress.py", "experiments/tables.py"),
 }

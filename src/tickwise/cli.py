@@ -22,6 +22,7 @@ from rich.text import Text
 from tickwise.errors import ConfigurationError, TickwiseError
 
 if TYPE_CHECKING:
+    from tickwise.experiments.executors import Executor
     from tickwise.experiments.suites import Suite
 
 app = typer.Typer(
@@ -42,6 +43,8 @@ FAILED, MISUSED, INTERRUPTED = 1, 2, 130
 # typer does not export the class of all errors in a command line, and has it from elsewhere in each version
 _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 
+Processes = Annotated[int | None, typer.Option(min=1, help="Processes (one a core).")]
+Address = Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Dask cluster that does the jobs.")]
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON document instead.")]
 _COLUMNS = "long CSV or Parquet (columns trajectory, tick, the variables, label), or NPZ (X, y, names)"
 
@@ -144,7 +147,8 @@ def reproduce(
     tasks: Annotated[int | None, typer.Option(min=1, help="Random pairs of tasks (50; 4 with --quick).")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, episodes and tasks.")] = False,
     out: Annotated[Path | None, typer.Option(help="The run folder (runs/STUDY or runs/STUDY-quick).")] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes (one a core).")] = None,
+    workers: Processes = None,
+    cluster: Address = None,
     seed: Annotated[int, typer.Option(min=0, help="The root seed.")] = 0,
 ) -> None:
     """Reproduce the paper's case studies, with a report; a second call goes on where the first one stopped.
@@ -152,40 +156,31 @@ def reproduce(
     For example: tickwise reproduce case1 --quick --out runs/look
     """
     from tickwise.experiments.case_studies import find_study
+    from tickwise.experiments.executors import executor
     from tickwise.experiments.progress import Display
-    from tickwise.experiments.publish import publish
-    from tickwise.experiments.runner import default_workers, run_study
+    from tickwise.experiments.reproduce import reproduce_study
     from tickwise.experiments.suites import find_suite
 
     folder = out or Path("runs") / (f"{study}-quick" if quick else study)
+    jobs = executor(workers, cluster)
     if study in ("random", "all"):
-        _carry_out(find_suite(study, tasks=tasks, runs=runs, seed=seed, quick=quick), folder, workers)
+        _carry_out(find_suite(study, tasks=tasks, runs=runs, seed=seed, quick=quick), folder, jobs)
         return
     spec = find_study(study, quick=quick, runs=runs, seed=seed)
     if tasks is not None:
         raise ConfigurationError(f"{study} has no random tasks; leave --tasks out, or reproduce random or all")
-    count = workers or default_workers()
-    began = time.monotonic()
     with _resumable(folder):
-        store = run_study(spec, folder, count, Display(messages))
-        summary = publish(spec, store, count, time.monotonic() - began)
+        summary = reproduce_study(spec, folder, jobs, Display(messages))
     _show(summary, folder)
 
 
-def _carry_out(suite: Suite, folder: Path, workers: int | None) -> None:
+def _carry_out(suite: Suite, folder: Path, jobs: Executor) -> None:
     """Do all that belongs to a suite, and show what it gave."""
     from tickwise.experiments.progress import Display
-    from tickwise.experiments.publish import publish_suite
-    from tickwise.experiments.runner import default_workers, run_units
-    from tickwise.experiments.store import Store
+    from tickwise.experiments.reproduce import reproduce_suite
 
-    count = workers or default_workers()
-    began = time.monotonic()
     with _resumable(folder):
-        Store.open(folder, suite.as_dict())
-        units = suite.units(folder)
-        stores = run_units(units.all, count, Display(messages))
-        summary = publish_suite(suite, folder, units, stores, count, time.monotonic() - began)
+        summary = reproduce_suite(suite, folder, jobs, Display(messages))
     _show(summary, folder)
 
 
@@ -383,15 +378,17 @@ def effect(
     runs: Annotated[int | None, typer.Option(min=1, help="Collections a value (3; 1 with --quick).")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few values.")] = False,
     out: Annotated[Path | None, typer.Option(help="The run folder (runs/effect-NAME).")] = None,
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes (one a core).")] = None,
+    workers: Processes = None,
+    cluster: Address = None,
     seed: Annotated[int, typer.Option(min=0, help="The root seed.")] = 0,
 ) -> None:
     """Measure what a setting does, with a plot: inference, formulas and learning under several values of it.
 
     For example: tickwise effect rate --quick
     """
+    from tickwise.experiments.executors import executor
     from tickwise.experiments.suites import effect_suite
 
     suite = effect_suite(name, study=study, runs=runs, seed=seed, quick=quick)
     folder = out or Path("runs") / (f"effect-{name}" + "-quick" * quick)
-    _carry_out(suite, folder, workers)
+    _carry_out(suite, folder, executor(workers, cluster))

@@ -46,3 +46,7 @@ class NotTransferableError(TickwiseError, RuntimeError):
 
 class MissingExtraError(TickwiseError, ImportError):
     """An optional dependency is needed; the message names the extra that installs it."""
+
+
+class ClusterError(TickwiseError, ConnectionError):
+    """A cluster cannot be reached, has no workers, or lost a job or itself."""

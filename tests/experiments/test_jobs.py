@@ -12,9 +12,11 @@ from tests.experiments.tiny import HOPELESS, TINY
 from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError, DataError, MissingFileError, StoreError
 from tickwise.experiments import jobs
+from tickwise.experiments.artefacts import Artefact, Parcel
 from tickwise.experiments.jobs import (
     STEPS,
     Job,
+    compute,
     evaluation_points,
     labelled_data,
     learning_problem,
@@ -130,15 +132,15 @@ def test_what_is_done_is_not_done_again(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_an_artefact_is_there_only_with_its_cost(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     saved: list[str] = []
-    save = Store.save
+    put = Store.put
 
-    def fails_later(self: Store, name: str, *content: Any) -> None:
-        saved.append(name)
+    def fails_later(self: Store, artefact: Artefact) -> None:
+        saved.append(artefact.name)
         if len(saved) == 2:
             raise StoreError("the disk is full")
-        save(self, name, *content)
+        put(self, artefact)
 
-    monkeypatch.setattr(Store, "save", fails_later)
+    monkeypatch.setattr(Store, "put", fails_later)
     store, job = open_store(tmp_path), Job("collect", "source", 0)
     with pytest.raises(StoreError):
         perform(job, TINY, store, silent)
@@ -267,3 +269,18 @@ def test_noise_turns_the_labels_of_a_share_round(finished: Path):
     assert set(noisy.labels) == {-1, 1}
     np.testing.assert_array_equal(noisy.values, clean.values)
     np.testing.assert_array_equal(labelled_data(spec, store, "source", 0).labels, noisy.labels)
+
+
+@pytest.mark.parametrize(
+    "job", [Job("collect", "target", 1), Job("infer", "", 1), *(Job("learn", who, 1) for who in ("I", "II", "IV"))]
+)
+def test_a_job_needs_nothing_but_what_it_says(finished: Path, job: Job):
+    store = open_store(finished)
+    parcel = Parcel({name: store.get(name) for name in job.needs})
+    cost, artefact = compute(job, TINY, parcel, silent)
+    assert cost.name == f"cost-{job.name}"
+    ours, theirs = artefact, store.get(job.name)
+    assert (ours.name, ours.manifest, ours.arrays) == (theirs.name, theirs.manifest, theirs.arrays)
+    for name in job.needs:
+        with pytest.raises(KeyError, match=name):
+            compute(job, TINY, Parcel({other: store.get(other) for other in job.needs if other != name}), silent)

@@ -20,13 +20,13 @@ from rich.console import Console
 import tests
 from tests.experiments.tiny import HOPELESS, LONG, TINY
 from tickwise.errors import ConfigurationError, DataError, StoreError, TickwiseError
-from tickwise.experiments import runner
+from tickwise.experiments import executors
+from tickwise.experiments.executors import default_workers
 from tickwise.experiments.jobs import Job
 from tickwise.experiments.progress import Display
 from tickwise.experiments.runner import (
     Unit,
     available_methods,
-    default_workers,
     planned_jobs,
     run_study,
     run_units,
@@ -68,13 +68,13 @@ def test_every_job_leaves_its_artefact(finished: Path):
 
 def test_the_longest_learning_comes_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     done: list[str] = []
-    real = runner.perform
+    real = executors.perform
 
     def noted(job: Job, *rest: Any) -> None:
         done.append(job.name)
         real(job, *rest)
 
-    monkeypatch.setattr(runner, "perform", noted)
+    monkeypatch.setattr(executors, "perform", noted)
     learning = replace(TINY.learning, source_episodes=300, most_episodes={"I": 100, "III": 200, "IV": 50})
     run(replace(TINY, runs=1, learning=learning), tmp_path / "run")
     assert done[3:] == ["learn-source-0", "learn-III-0", "learn-I-0", "learn-IV-0"]
@@ -94,7 +94,7 @@ def test_several_studies_are_carried_out_phase_by_phase(tmp_path: Path):
 
 
 def test_a_finished_study_is_left_alone(finished: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(runner, "perform", lambda *_: pytest.fail("done again"))
+    monkeypatch.setattr(executors, "perform", lambda *_: pytest.fail("done again"))
     stream = io.StringIO()
     run_study(TINY, finished, 3, Display(Console(file=stream)))
     assert stream.getvalue().splitlines() == [

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from tickwise.errors import MissingFileError, StoreError
-from tickwise.experiments import store as module
+from tickwise.experiments import artefacts
 from tickwise.experiments.store import Store, read_json, write_bytes, write_json
 
 ARRAYS = {"b": np.arange(6, dtype=np.int32).reshape(2, 3), "a": np.array([0.5, np.nan])}
@@ -58,8 +58,8 @@ def test_an_artefact_without_arrays_is_one_file(store: Store):
     )
 )
 def test_any_array_comes_back_from_the_same_bytes(array: np.ndarray):
-    content = module._npz({"array": array, "other": ARRAYS["b"]})
-    assert content == module._npz({"other": ARRAYS["b"], "array": array})
+    content = artefacts._npz({"array": array, "other": ARRAYS["b"]})
+    assert content == artefacts._npz({"other": ARRAYS["b"], "array": array})
     with np.load(io.BytesIO(content), allow_pickle=False) as found:
         np.testing.assert_array_equal(found["array"], array)
         assert found["array"].dtype == array.dtype
@@ -202,7 +202,7 @@ def test_broken_arrays_are_named(store: Store):
 
 def test_arrays_that_lack_a_named_one_are_broken(store: Store):
     store.save("one", {}, ARRAYS)
-    write_bytes(store.folder / "artefacts" / "one.npz", module._npz({"a": ARRAYS["a"]}))
+    write_bytes(store.folder / "artefacts" / "one.npz", artefacts._npz({"a": ARRAYS["a"]}))
     with pytest.raises(StoreError, match="is broken"):
         store.load("one")
     np.save(store.folder / "artefacts" / "one", ARRAYS["a"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,9 @@ from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.planning import optimal_value
 from tickwise.errors import ConfigurationError, DataError
+from tickwise.experiments.artefacts import Artefact, Artefacts
 from tickwise.experiments.measures import block_means, goal_reached
+from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import Collection, StudySpec
 from tickwise.inference.information import information_gain
@@ -73,6 +74,20 @@ class Job:
         """What its progress counts."""
         return "formulas" if self.kind == "infer" else "episodes"
 
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The names of the artefacts that it is made from."""
+        if self.kind == "infer":
+            return tuple(Job("collect", task, self.run).name for task in ("source", "target"))
+        if self.kind == "collect" or self.subject == "I":
+            return ()
+        learned = (Job("learn", "source", self.run).name,) if self.subject == "IV" else ()
+        return (_FORMULAS.name, *learned)
+
+
+_FORMULAS = Job("infer", "", 0)
+"""All runs learn with the formulas of the first collection, as the paper has one of each."""
+
 
 def perform(job: Job, spec: StudySpec, store: Store, report: Report) -> None:
     """Do a job and write its artefact, and before that what it cost; nothing is done where it is there already.
@@ -83,21 +98,20 @@ def perform(job: Job, spec: StudySpec, store: Store, report: Report) -> None:
     """
     if store.has(job.name):
         return
+    for artefact in compute(job, spec, store, report):
+        store.put(artefact)
+
+
+def compute(job: Job, spec: StudySpec, artefacts: Artefacts, report: Report) -> tuple[Artefact, Artefact]:
+    """What a job cost, and what it gives: a function of the specification and of the artefacts that it needs.
+
+    Raises:
+        DataError: If a collection gives no trajectory of label 1.
+    """
     began = time.perf_counter()
-    outcome = _KINDS[job.kind](job, spec, store, report)
+    outcome = _KINDS[job.kind](job, spec, artefacts, report)
     cost = {"seconds": round(time.perf_counter() - began, 3), "memory_mib": peak_memory_mib(), **outcome.cost}
-    store.save(f"cost-{job.name}", cost, {})
-    store.save(job.name, outcome.manifest, outcome.arrays)
-
-
-def peak_memory_mib() -> float:
-    """The most memory that this process has held so far, in MiB; 0 where the system does not tell."""
-    try:
-        import resource
-    except ImportError:  # Windows
-        return 0.0
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return round(peak / (2**20 if sys.platform == "darwin" else 2**10), 1)
+    return Artefact.pack(f"cost-{job.name}", cost, {}), Artefact.pack(job.name, outcome.manifest, outcome.arrays)
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +123,7 @@ class _Outcome:
     cost: dict[str, Any] = field(default_factory=dict)
 
 
-def _collect(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
+def _collect(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outcome:
     """The data collection phase (Section IV-A): label the first episodes of Q-learning on τ-states."""
     del store
     phase = spec.collection
@@ -167,7 +181,7 @@ def _labelled(
     return _Outcome(facts, {"paths": paths[picked], "labels": labels})
 
 
-def labelled_data(spec: StudySpec, store: Store, task: str, run: int) -> LabelledTrajectories:
+def labelled_data(spec: StudySpec, store: Artefacts, task: str, run: int) -> LabelledTrajectories:
     """The labelled trajectories of a collection; the state is the robot's position.
 
     Where label 1 is for lasting long, the last state of these trajectories is left out (Case Study 2). Where there
@@ -194,7 +208,7 @@ def environment_of(spec: StudySpec, task: str) -> EnvironmentSpec:
     return spec.source if task == "source" else spec.target
 
 
-def inference_task(spec: StudySpec, store: Store, task: str, run: int) -> Task:
+def inference_task(spec: StudySpec, store: Artefacts, task: str, run: int) -> Task:
     """What inference needs: the data, the uniform prior over the MDP's paths, and whole cells as regions."""
     environment = environment_of(spec, task)
     mdp, horizon = environment.mdp(), environment.task.deadline
@@ -207,7 +221,7 @@ STEPS = (*PARTS, "plain")
 """What an inference consists of: the parts of Steps 1 and 2, and Step 2 without the information gain."""
 
 
-def _infer(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
+def _infer(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outcome:
     """Steps 1 and 2 (Section IV-B), and φ'^T, which is Step 2 without the information gain.
 
     φ'^T is Method II's, and is left out with it. The cost has the processor time in seconds of each of `STEPS` that
@@ -217,10 +231,10 @@ def _infer(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
     rngs = [generator(spec.seed, spec.name, "infer", what, job.run) for what in ("source", "target", "plain")]
     report(0, len(STEPS))
     _compile_inference()
-    marks = [time.process_time()]
+    marks = [time.thread_time()]
 
     def done(step: str) -> None:
-        marks.append(time.process_time())
+        marks.append(time.thread_time())
         report(STEPS.index(step) + 1, len(STEPS))
 
     found = transfer_structure(source, target, spec.inference, spec.swarm, rngs[0], rngs[1], done)
@@ -295,12 +309,12 @@ def _tree(node: DecisionTree | None) -> dict[str, Any] | None:
     }  # fmt: skip
 
 
-def study_formulas(store: Store) -> dict[str, SDNF | None]:
-    """The formulas that all runs learn with: those of the first collection, as the paper has one of each.
+def study_formulas(store: Artefacts) -> dict[str, SDNF | None]:
+    """The formulas that all runs learn with.
 
     φ^T and φ'^T are None where they are not satisfying formulas of the target task (Problem 1).
     """
-    found = store.load(Job("infer", "", 0).name)
+    found = store.load(_FORMULAS.name)
     plain = found["target_without_information"]
     texts = {
         "source": found["source"]["formula"],
@@ -310,7 +324,7 @@ def study_formulas(store: Store) -> dict[str, SDNF | None]:
     return {name: None if text is None else to_sdnf(parse(text)) for name, text in texts.items()}
 
 
-def learning_problem(spec: StudySpec, store: Store, subject: str) -> Problem:
+def learning_problem(spec: StudySpec, store: Artefacts, subject: str) -> Problem:
     """What ``source`` or a method learns on: τ-states for Method I, extended states for all else (Section V).
 
     Raises:
@@ -339,7 +353,7 @@ def evaluation_points(spec: StudySpec, episodes: int) -> list[int]:
     return points
 
 
-def _learn(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
+def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outcome:
     """Q-learning (Step 3) of the source task or of one of Methods I to IV, with evaluations on fixed seeds."""
     learning, subject = spec.learning, job.subject
     settings = learning.source if subject == "source" else learning.settings
@@ -371,7 +385,7 @@ def _learn(job: Job, spec: StudySpec, store: Store, report: Report) -> _Outcome:
     return _Outcome({"run": job.run, "episodes": episodes, "goal": goal}, arrays)
 
 
-_KINDS: dict[str, Callable[[Job, StudySpec, Store, Report], _Outcome]] = {
+_KINDS: dict[str, Callable[[Job, StudySpec, Artefacts, Report], _Outcome]] = {
     "collect": _collect,
     "infer": _infer,
     "learn": _learn,

@@ -85,6 +85,10 @@ class Display:
         """Say that a phase was finished by an earlier call."""
         self._console.print(f"{name}: {_jobs(jobs)} finished before")
 
+    def say(self, line: str) -> None:
+        """Tell a person something while the work goes on."""
+        self._console.print(line)
+
     @contextmanager
     def phase(
         self, name: str, items: Sequence[Item], shared: Board, before: int = 0

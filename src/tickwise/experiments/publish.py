@@ -16,7 +16,7 @@ from tickwise.experiments.effect_catalog import EFFECTS
 from tickwise.experiments.effect_part import effect_part
 from tickwise.experiments.effects import effect_results
 from tickwise.experiments.figures import draw_effect, draw_figures, draw_pairs
-from tickwise.experiments.jobs import peak_memory_mib
+from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.pairs import gather_pairs
 from tickwise.experiments.pairs_part import pairs_part
 from tickwise.experiments.report import Part, render_page, study_part

@@ -2,22 +2,13 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from multiprocessing import active_children, get_context
 from pathlib import Path
-from typing import Any
 
-from tickwise.errors import ConfigurationError, TickwiseError
-from tickwise.experiments.jobs import Job, perform, study_formulas
-from tickwise.experiments.progress import Board, Display, Item, board
+from tickwise.experiments.executors import Executor, Local, Run, Task, interruptible
+from tickwise.experiments.jobs import Job, study_formulas
+from tickwise.experiments.progress import Display, Item, board
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import StudySpec
 
@@ -59,19 +50,19 @@ _Phase = tuple[str, list[Job]]
 """A name, and jobs of a study that need artefacts of earlier phases only."""
 
 
-def run_study(spec: StudySpec, folder: Path, workers: int, display: Display) -> Store:
+def run_study(spec: StudySpec, folder: Path, workers: int | Executor, display: Display) -> Store:
     """Do all jobs of one study; see `run_units`."""
     return run_units([Unit("", spec, folder)], workers, display)[0]
 
 
-def run_units(units: Sequence[Unit], workers: int, display: Display) -> list[Store]:
+def run_units(units: Sequence[Unit], workers: int | Executor, display: Display) -> list[Store]:
     """Do all jobs of some studies, phase by phase; what an earlier call finished in the same folders is kept.
 
-    The numbers depend on the specifications alone, not on the number of workers or on interruptions.
+    The numbers depend on the specifications alone, not on who does the jobs or on interruptions.
 
     Args:
         units: The studies, each with a folder of its own.
-        workers: Processes that work at the same time; with 1 the work is done in this process.
+        workers: Processes that work at the same time, with 1 this one; or something else that carries out jobs.
         display: Shows the progress.
 
     Returns:
@@ -83,29 +74,21 @@ def run_units(units: Sequence[Unit], workers: int, display: Display) -> list[Sto
         TickwiseError: If a job cannot be done; finished jobs are kept.
         KeyboardInterrupt: On Ctrl-C or SIGTERM; finished jobs are kept.
     """
-    if workers < 1:
-        raise ConfigurationError(f"there are {workers} workers; use 1 or more")
+    executor = Local(workers) if isinstance(workers, int) else workers
     stores = [Store.open(unit.folder, unit.spec.as_dict()) for unit in units]
     try:
-        with _pool(workers) as pool:
-            _carry_out([_preparation(unit.spec) for unit in units], units, stores, pool, display)
+        with interruptible(), executor.start(display.say) as run:
+            _carry_out([_preparation(unit.spec) for unit in units], units, stores, run, display)
             learning = [
                 _learning(unit.spec, available_methods(unit.spec, store))
                 for unit, store in zip(units, stores, strict=True)
             ]
-            _carry_out(learning, units, stores, pool, display)
+            _carry_out(learning, units, stores, run, display)
     except BaseException:
         for store in stores:
             store.sweep()
         raise
     return stores
-
-
-def default_workers() -> int:
-    """The number of cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def available_methods(spec: StudySpec, store: Store) -> tuple[str, ...]:
@@ -162,7 +145,7 @@ def _carry_out(
     plans: Sequence[list[_Phase]],
     units: Sequence[Unit],
     stores: Sequence[Store],
-    pool: ProcessPoolExecutor | None,
+    run: Run,
     display: Display,
 ) -> None:
     """The phases of all units, those of the same name together."""
@@ -175,101 +158,16 @@ def _carry_out(
             for job in jobs
         ]
         pieces.sort(key=lambda piece: -piece.weight)  # the longest first, so that the cores have work to the end
-        _phase(name, pieces, pool, display)
+        _phase(name, pieces, run, display)
 
 
-def _phase(name: str, pieces: Sequence[_Piece], pool: ProcessPoolExecutor | None, display: Display) -> None:
+def _phase(name: str, pieces: Sequence[_Piece], run: Run, display: Display) -> None:
     left = [piece for piece in pieces if not piece.store.has(piece.job.name)]
     if not left:
         display.skip(name, len(pieces))
         return
     items = [Item(piece.title, piece.job.unit, piece.weight) for piece in left]
     with board(len(left)) as shared, display.phase(name, items, shared, len(pieces) - len(left)) as finish:
-        tasks = [(index, piece.job, piece.unit.spec, piece.store, shared) for index, piece in enumerate(left)]
-        for index in _results(pool, tasks):
+        tasks = [Task(index, piece.job, piece.unit.spec, piece.store) for index, piece in enumerate(left)]
+        for index in run(tasks, shared):
             finish(index)
-
-
-_Task = tuple[int, Job, StudySpec, Store, Board]
-
-
-def _results(pool: ProcessPoolExecutor | None, tasks: Sequence[_Task]) -> Iterator[int]:
-    """The index of each task when it is done."""
-    if pool is None:
-        for task in tasks:
-            yield _work(*task)
-        return
-    try:
-        # the workers that start now go on ignoring Ctrl-C, and show no traceback
-        with _on_signal(signal.SIG_IGN, signal.SIGINT):
-            futures: list[Future[int]] = [pool.submit(_work, *task) for task in tasks]
-        for future in as_completed(futures):
-            yield future.result()
-    except BrokenProcessPool as error:
-        raise TickwiseError(
-            "a worker process was killed, perhaps for want of memory; run the same command again with fewer "
-            "--workers: what is finished is kept"
-        ) from error
-
-
-@contextmanager
-def _pool(workers: int) -> Iterator[ProcessPoolExecutor | None]:
-    """Worker processes, started as they are needed; None if this process does the work itself.
-
-    An error or Ctrl-C ends them at once: artefacts are written atomically, so that nothing is lost but the work at
-    hand. Only the first Ctrl-C counts, so that no other one disturbs this; being told to end (SIGTERM) is the same.
-    """
-    others = set(active_children())
-    with _on_signal(_interrupt_once, signal.SIGINT, signal.SIGTERM):
-        if workers == 1:
-            yield None
-            return
-        pool = ProcessPoolExecutor(
-            workers, mp_context=get_context("spawn"), initializer=_end_with, initargs=(os.getpid(),)
-        )
-        try:
-            yield pool
-        except BaseException:
-            for child in set(active_children()) - others:
-                child.kill()
-            raise
-        finally:
-            pool.shutdown(cancel_futures=True)
-
-
-def _interrupt_once(number: int, frame: object) -> None:
-    del frame
-    signal.signal(number, signal.SIG_IGN)
-    raise KeyboardInterrupt
-
-
-@contextmanager
-def _on_signal(action: Callable[[int, Any], None] | signal.Handlers, *numbers: int) -> Iterator[None]:
-    """Let signals do something else for a while; one that is ignored stays so."""
-    main = threading.current_thread() is threading.main_thread()  # no other thread has a say in signals
-    before = {number: signal.getsignal(number) for number in numbers if main}
-    changed = {number: handler for number, handler in before.items() if handler not in (None, signal.SIG_IGN)}
-    for number in changed:
-        signal.signal(number, action)
-    try:
-        yield
-    finally:
-        for number, handler in changed.items():
-            signal.signal(number, handler)
-
-
-def _work(index: int, job: Job, spec: StudySpec, store: Store, shared: Board) -> int:
-    """Do a job; its index comes back."""
-    perform(job, spec, store, shared.reporter(index))
-    return index
-
-
-def _end_with(parent: int) -> None:
-    """Let this worker end soon after the process that started it, even if that was killed, and before any work came."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()

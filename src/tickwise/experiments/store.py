@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
-import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import MissingFileError, StoreError
+from tickwise.experiments.artefacts import Artefact, json_bytes, named_arrays, parse_json
 
 FORMAT = 2
 """Changes whenever old artefacts can no longer be read or would be computed in another way."""
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)
 _TEMPORARY = ".tmp"
 
 
@@ -72,7 +68,7 @@ class Store:
             StoreError: If its manifest cannot be read.
         """
         path = self._manifest(name)
-        return path.exists() and (not _named(read_json(path), path) or self._arrays(name).exists())
+        return path.exists() and (not named_arrays(read_json(path), path) or self._arrays(name).exists())
 
     def save(self, name: str, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write an artefact, all or nothing; the same content gives the same bytes.
@@ -80,9 +76,13 @@ class Store:
         Raises:
             StoreError: If it cannot be written.
         """
-        if arrays:
-            write_bytes(self._arrays(name), _npz(arrays))
-        write_json(self._manifest(name), {**manifest, "arrays": sorted(arrays)})
+        self.put(Artefact.pack(name, manifest, arrays))
+
+    def put(self, artefact: Artefact) -> None:
+        """Write an artefact that is bytes already; see `save`."""
+        if artefact.arrays is not None:
+            write_bytes(self._arrays(artefact.name), artefact.arrays)
+        write_bytes(self._manifest(artefact.name), artefact.manifest)
 
     def load(self, name: str) -> dict[str, Any]:
         """An artefact's manifest and arrays, as one mapping.
@@ -91,11 +91,14 @@ class Store:
             MissingFileError: If there is no such artefact.
             StoreError: If a file cannot be read.
         """
+        return self.get(name).content()
+
+    def get(self, name: str) -> Artefact:
+        """An artefact as bytes; see `load`."""
         path = self._manifest(name)
-        manifest = read_json(path)
-        named = _named(manifest, path)
-        arrays = _load_npz(self._arrays(name), named) if named else {}
-        return {key: value for key, value in manifest.items() if key != "arrays"} | arrays
+        manifest = _read(path)
+        named = named_arrays(parse_json(manifest, path), path)
+        return Artefact(name, manifest, _read(self._arrays(name)) if named else None, path.parent)
 
     def sweep(self) -> None:
         """Remove what writers left that were killed half-way; call it when nothing is writing any more."""
@@ -131,7 +134,7 @@ def read_configuration(folder: Path) -> dict[str, Any] | None:
 
 def write_json(path: Path, content: Any) -> None:
     """Write plain data as a JSON file, atomically; see `write_bytes`."""
-    write_text(path, json.dumps(content, indent=1, ensure_ascii=False) + "\n")
+    write_bytes(path, json_bytes(content))
 
 
 def write_text(path: Path, text: str) -> None:
@@ -172,25 +175,16 @@ def read_json(path: Path) -> Any:
         MissingFileError: If it does not exist.
         StoreError: If it cannot be read or is no JSON.
     """
+    return parse_json(_read(path), path)
+
+
+def _read(path: Path) -> bytes:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return path.read_bytes()
     except FileNotFoundError as error:
         raise MissingFileError(f"there is no file {path}; run the same study again, it goes on there") from error
     except OSError as error:
         raise StoreError(f"cannot read {path}: {error.strerror}; check its permissions") from error
-    except ValueError as error:
-        raise _broken(path, error) from error
-
-
-def _named(manifest: Any, path: Path) -> list[str]:
-    """The names of the arrays that belong to a manifest."""
-    if not isinstance(manifest, dict) or not isinstance(manifest.get("arrays"), list):
-        raise _broken(path, "it does not name its arrays")
-    return [str(name) for name in manifest["arrays"]]
-
-
-def _broken(path: Path, reason: object) -> StoreError:
-    return StoreError(f"{path} is broken ({reason}); remove it and run the same study again")
 
 
 def _holds_files(folder: Path) -> bool:
@@ -203,30 +197,6 @@ def _holds_files(folder: Path) -> bool:
 
 def _foreign(folder: Path) -> Iterator[Path]:
     return (path for path in folder.iterdir() if not path.match(f".config.json.*{_TEMPORARY}"))
-
-
-def _npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """An npz file whose bytes depend on the arrays alone: NumPy's own carries the time of writing."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
-        for name, array in sorted(arrays.items()):
-            entry = io.BytesIO()
-            np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
-            info = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
-            info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(info, entry.getvalue())
-    return buffer.getvalue()
-
-
-def _load_npz(path: Path, names: list[str]) -> dict[str, NDArray[Any]]:
-    try:
-        # from memory, since NumPy leaves a file open where it is broken
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in names}
-    except FileNotFoundError as error:
-        raise MissingFileError(f"there is no file {path}; run the same study again, it goes on there") from error
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise _broken(path, error) from error
 
 
 def _difference(found: Any, wanted: Any, path: str = "") -> str:
