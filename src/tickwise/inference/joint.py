@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,6 +27,22 @@ _ALONE: Draft = ((None,),)
 Scored = tuple[float, Draft]
 
 
+@dataclass(slots=True)
+class _Bar:
+    """What a beginning has to be worth: better than a trivial formula, by half of what the best so far is better."""
+
+    trivial: float
+    least: float
+
+    @classmethod
+    def of(cls, drafter: Drafter) -> _Bar:
+        return cls(drafter.trivial, drafter.trivial)
+
+    def met(self, value: float) -> None:
+        """Take note of a beginning."""
+        self.least = max(self.least, self.trivial + (value - self.trivial) / 2)
+
+
 def fit_jointly(drafter: Drafter, structure: Structure, start: Draft | None = None) -> Draft | None:
     """The best formula of a structure that the ascents from all beginnings find.
 
@@ -38,7 +55,7 @@ def fit_jointly(drafter: Drafter, structure: Structure, start: Draft | None = No
         The formula; None if there is no room for the structure.
     """
     rough = coarser(drafter, _COARSE)
-    begun = list(_conjunctions(rough, structure[0])) if len(structure) == 1 else list(_coverings(rough, structure, ()))
+    begun = list(_conjunctions(rough, structure[0]) if len(structure) == 1 else _coverings(rough, structure, ()))
     if start is not None and len(start) <= len(structure):
         begun += _coverings(rough, structure, start)
     found = _climb(drafter, [(draft, structure) for draft in begun])
@@ -79,7 +96,8 @@ def _grown(drafter: Drafter, rough: Drafter, seed: Draft, size: int, rate: float
     """The best formula of each size that comes of one primitive."""
     beam, best = [seed], [seed]
     while len(best) < size and drafter.rate(best[-1]) < rate and not drafter.interrupted:
-        climbed = _climb(drafter, (pair for draft in beam for pair in _extended(rough, draft)), rate)
+        bar = _Bar.of(rough)
+        climbed = _climb(drafter, (pair for draft in beam for pair in _extended(rough, draft, bar)), rate)
         if not climbed:
             break
         beam = [draft for _, draft in climbed[:_BEAM]]
@@ -108,10 +126,16 @@ def _climb(drafter: Drafter, begun: Iterable[tuple[Draft, Structure]], enough: f
 def _conjunctions(drafter: Drafter, row: tuple[Choice, ...]) -> Iterator[Draft]:
     """Beginnings of one conjunction: its primitives one after the other, in many orders."""
     structure, places = (row,), range(len(row))
-    orders = itertools.permutations(places) if len(row) <= _MOST_ORDERS else (places, reversed(places))
-    for first, *rest in orders:
-        for draft in _firsts(drafter, structure, ((None,) * len(row),), first):
-            yield from _filled(drafter, structure, draft, 0, rest)
+    orders = list(itertools.permutations(places) if len(row) <= _MOST_ORDERS else (places, reversed(places)))
+    met = False
+    for bar in (_Bar.of(drafter), None):  # without a bar where no beginning meets it
+        for first, *rest in orders:
+            for draft in _firsts(drafter, structure, ((None,) * len(row),), first):
+                for full in _filled(drafter, structure, draft, 0, rest, bar):
+                    met = True
+                    yield full
+        if met:
+            break
 
 
 def _firsts(drafter: Drafter, structure: Structure, draft: Draft, j: int) -> Iterator[Draft]:
@@ -137,18 +161,21 @@ def _retimed(drafter: Drafter, structure: Structure, draft: Draft, j: int) -> It
                 yield filled(draft, 0, j, found.primitive)
 
 
-def _filled(drafter: Drafter, structure: Structure, draft: Draft, i: int, rest: Iterable[int]) -> Iterator[Draft]:
-    """The draft with the rest of disjunct i filled, one place after the other; nothing where there is no room."""
+def _filled(
+    drafter: Drafter, structure: Structure, draft: Draft, i: int, rest: Iterable[int], bar: _Bar | None
+) -> Iterator[Draft]:
+    """The draft with the rest of disjunct i filled, one place after the other; nothing if it does not meet the bar."""
     left = list(rest)
     for k, j in enumerate(left):
-        found = None
-        if k + 1 == len(left):
-            found = drafter.place(draft, structure, i, j, least=drafter.trivial)
-        if found is None:
-            found = drafter.place(draft, structure, i, j, positives=_keep(drafter))
+        weight, least = _keep(drafter), -math.inf
+        if bar is not None and k + 1 == len(left):
+            weight, least = 1.0, bar.least
+        found = drafter.place(draft, structure, i, j, positives=weight, least=least)
         if found is None:
             return
         draft = filled(draft, i, j, found.primitive)
+    if bar is not None and left:
+        bar.met(drafter.value(draft))
     yield draft
 
 
@@ -172,17 +199,17 @@ def _coverings(drafter: Drafter, structure: Structure, known: Draft) -> Iterator
     yield tuple(draft)
 
 
-def _extended(drafter: Drafter, draft: Draft) -> Iterator[tuple[Draft, Structure]]:
+def _extended(drafter: Drafter, draft: Draft, bar: _Bar) -> Iterator[tuple[Draft, Structure]]:
     """A draft with one more primitive, wherever there is room for it."""
     for i, row in enumerate(draft):
-        for j in range(len(row) + 1):
+        for j in range(len(row), -1, -1):
             wider: Draft = (*draft[:i], (*row[:j], None, *row[j:]), *draft[i + 1 :])
             structure = _free(wider)
             begun = _retimed(drafter, structure, wider, 1 - j) if len(draft) == len(row) == 1 else [wider]
             for one in begun:
-                yield from ((full, structure) for full in _filled(drafter, structure, one, i, [j]))
+                yield from ((full, structure) for full in _filled(drafter, structure, one, i, [j], bar))
     more: Draft = (*draft, (None,))
-    yield from ((full, _free(more)) for full in _filled(drafter, _free(more), more, len(draft), [0]))
+    yield from ((full, _free(more)) for full in _filled(drafter, _free(more), more, len(draft), [0], bar))
 
 
 def _free(draft: Draft) -> Structure:
