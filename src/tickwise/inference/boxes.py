@@ -99,7 +99,7 @@ def first_key(node: Node, levels: Levels) -> tuple[int, ...]:
     """Where the first of a node's boxes stands among primitives of equal worth.
 
     In this order: the fewest closed sides of variables whose sides may be open; the plain box before its complement;
-    the tightest predicate, variable by variable; ◇ and ◇□ before □ and □◇.
+    the tightest predicate, variable by variable.
     """
     (lo_min, lo_max), (hi_min, hi_max) = ranges(node).tolist()
     closed, tightest = 0, list[int]()
@@ -108,7 +108,7 @@ def first_key(node: Node, levels: Levels) -> tuple[int, ...]:
             closed += math.isfinite(sides[lo_min[variable]]) + math.isfinite(sides[hi_max[variable]])
         loose, tight = (lo_min[variable], -hi_max[variable]), (-lo_max[variable], hi_min[variable])
         tightest += loose if node[1] else tight
-    return (closed, int(node[1]), *tightest, 1 - int(node[0]))
+    return (closed, int(node[1]), *tightest)
 
 
 def tighter(node: Node, levels: Levels) -> Iterator[Node]:

@@ -330,7 +330,7 @@ class _Search:
 
     def _times_key(self, node: Node, times: NDArray[np.int64]) -> tuple[int, ...]:
         start, end, duration = times.tolist()
-        return (duration > 0, -duration, -start, end) if node[0] else (duration > 0, duration, start, -end)
+        return (_operator(node, times), *((-duration, -start, end) if node[0] else (duration, start, -end)))
 
     def _value(self, times: NDArray[np.int64], weight: float, logarithm: float) -> float:
         worth = self.problem.worth
