@@ -8,7 +8,7 @@ ends. One pass over the trajectories thus gives every window and duration of a b
 
 A node of the search is a range of boxes. Trajectories with label 1 are judged by the loosest of its predicates, others
 by the tightest; this bounds the classification rate of each of its boxes from above; of a single box it is the
-rate itself. A node is an array ``[existential, complemented, lo_min…, lo_max…, hi_min…, hi_max…]`` with a level's number
+rate itself. A node is ``[existential, complemented, lo_min…, lo_max…, hi_min…, hi_max…]`` with the number of a level
 for every variable.
 """
 
