@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.inference.exhaustive import best_of_all, problem_of
 from tests.inference.worlds import grid_prior
+from tickwise.errors import ConfigurationError, UnknownVariableError
+from tickwise.inference.bounding import Bounds
+from tickwise.inference.boxes import Node
 from tickwise.inference.exact import ExactProblem, ExactSettings, exact_search
 from tickwise.inference.objective import trajectory_weights
 from tickwise.inference.prior import BoxPrior, MarkovPrior, Prior
-from tickwise.inference.space import Gaps, SearchSpace
+from tickwise.inference.space import OPERATORS, Gaps, SearchSpace
 from tickwise.inference.trajectories import LabelledTrajectories
 
 WEIGHTS = (None, "balanced", {1: 3.0, -1: 0.5})
@@ -107,3 +111,98 @@ def test_continuous_variables(seed, width, mixed, information_weight, nesting_co
         data, prior, space, information_weight=information_weight, nesting_cost=nesting_cost, class_weight=class_weight
     )
     check(problem, data, class_weight)
+
+
+def cut_off(data: LabelledTrajectories, problem: ExactProblem, **limits) -> None:
+    """A search with limits says rightly how much better the best primitive may be."""
+    value, _ = best_of_all(problem, data, np.ones(len(data)))
+    result = exact_search(problem, ExactSettings(**limits))
+    assert result.value <= value + 1e-12
+    assert result.bound >= value - 1e-12
+    assert result.gap >= value - result.value - 1e-12
+    assert result.proved == (result.gap <= 1e-12)
+
+
+def by_chance(size: int) -> LabelledTrajectories:
+    """Walks with labels that mean nothing: the search is long."""
+    data = cells(5, size, 6, 40)
+    labels = np.where(np.random.default_rng(1).random(40) < 0.5, 1, -1)
+    return LabelledTrajectories(data.values, data.lengths, labels, data.variables, data.ids)
+
+
+DATA = by_chance(3)
+PROBLEM = problem_of(DATA, grid_prior(3, 5), SearchSpace.grid(3, 5), information_weight=0.3)
+PLAIN = problem_of(DATA, grid_prior(3, 5), SearchSpace.grid(3, 5), information_weight=0.0)
+
+
+@pytest.mark.parametrize("limits", [{"nodes": 1}, {"nodes": 40}, {"seconds": 1e-9}, {"seconds": 1e-9, "threads": 2}])
+def test_a_search_that_is_stopped_bounds_what_it_missed(limits):
+    cut_off(DATA, PROBLEM, **limits)
+    result = exact_search(PROBLEM, ExactSettings(**limits))
+    assert not result.proved
+    assert not result.interrupted
+
+
+class Interrupter:
+    """Bounds that are interrupted at their n-th call."""
+
+    def __init__(self, call: int) -> None:
+        self.left = call
+        self.bounds = Bounds.__call__
+
+    def __call__(self, bounds: Bounds, nodes: list[Node]) -> list[float]:
+        self.left -= 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+        return self.bounds(bounds, nodes)
+
+
+@pytest.mark.parametrize("problem", [PLAIN])
+@pytest.mark.parametrize("call", range(2, 8))
+def test_an_interrupted_search_has_the_best_so_far(monkeypatch, problem, call):
+    value, _ = best_of_all(problem, DATA, np.ones(len(DATA)))
+    interrupter = Interrupter(call)
+    monkeypatch.setattr(Bounds, "__call__", lambda bounds, nodes: interrupter(bounds, nodes))
+    result = exact_search(problem, ExactSettings())
+    assert interrupter.left == 0
+    assert result.interrupted
+    assert not result.proved
+    assert result.value <= value + 1e-12
+    assert result.bound >= value - 1e-12  # what was taken off the heap when it happened counts too
+
+
+def test_an_interruption_before_there_is_anything_goes_on(monkeypatch):
+    interrupter = Interrupter(1)
+    monkeypatch.setattr(Bounds, "__call__", lambda bounds, nodes: interrupter(bounds, nodes))
+    with pytest.raises(KeyboardInterrupt):
+        exact_search(PROBLEM, ExactSettings())
+
+
+def test_threads_do_not_matter():
+    one, two = (exact_search(PROBLEM, ExactSettings(threads=threads)) for threads in (1, 2))
+    assert one == two
+    check(PROBLEM, DATA, threads=3)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong"), [("levels", 0), ("nodes", 0), ("threads", -1), ("seconds", 0.0), ("seconds", float("nan"))]
+)
+def test_wrong_settings(name, wrong):
+    with pytest.raises(ConfigurationError, match=f"exact setting {name} is {wrong}; use [^\n]+$"):
+        ExactSettings(**{name: wrong})
+
+
+@pytest.mark.parametrize(
+    ("gaps", "operators"),
+    [((), OPERATORS), (((3, 3),), OPERATORS), (((0, 1), (4, 5)), [op for op in OPERATORS if op.nested])],
+)
+def test_no_room_for_a_window(gaps, operators):
+    problem = problem_of(DATA, grid_prior(3, 5), SearchSpace.grid(3, 5), gaps=gaps, operators=operators)
+    with pytest.raises(ConfigurationError, match=r"no gap has room for a window of two ticks; use a longer horizon$"):
+        exact_search(problem, ExactSettings())
+
+
+def test_a_prior_that_lacks_a_variable():
+    problem = problem_of(DATA, BoxPrior({"x": (0, 3)}, 5), SearchSpace.grid(3, 5))
+    with pytest.raises(UnknownVariableError, match="the prior has no variable 'y'"):
+        exact_search(problem, ExactSettings())

@@ -253,22 +253,24 @@ class _Search:
         self.nodes = 0
 
     def run(self) -> ExactResult:
-        clock, interrupted, bound = _Clock(self.settings.seconds), False, -math.inf
+        clock, interrupted, bound = _Clock(self.settings.seconds), False, math.inf
         with self.bounds:
             try:
                 self._push([root(self.problem.levels, *kind) for kind in self.problem.kinds])
                 batches = 0
                 while self.heap:
+                    bound = -self.heap[0][0]  # of all that is left, also while some of it is taken off the heap
                     full = len(self.heap) > self.settings.nodes
                     if (full or clock.over) and self.best.node is not None:
-                        bound = -self.heap[0][0]
                         break
                     self._step(dive=batches < _DIVES)
                     batches += 1
+                else:
+                    bound = -math.inf
             except KeyboardInterrupt:
                 if self.best.node is None:
                     raise
-                interrupted, bound = True, -self.heap[0][0] if self.heap else math.inf
+                interrupted = True
         return self._result(max(bound, self.best.value), interrupted)
 
     def _step(self, *, dive: bool) -> None:
