@@ -157,7 +157,7 @@ class Interrupter:
         return self.bounds(bounds, nodes)
 
 
-@pytest.mark.parametrize("problem", [PLAIN])
+@pytest.mark.parametrize("problem", [PLAIN, PROBLEM])
 @pytest.mark.parametrize("call", range(2, 8))
 def test_an_interrupted_search_has_the_best_so_far(monkeypatch, problem, call):
     value, _ = best_of_all(problem, DATA, np.ones(len(DATA)))

@@ -317,7 +317,8 @@ class _Search:
         enough = best.value - _TIE
         found = candidates(problem.coded, node, *self.bounds.arguments, enough, floor)
         informed = worth.information_weight > 0
-        neighbours = [(near, self._floor(near)) for near in tighter(node, problem.levels)] if informed else []
+        near_ones = tighter(node, problem.levels) if informed and best.node is not None else ()
+        neighbours = [(near, self._floor(near)) for near in near_ones]
         for k in np.argsort(-found[2], kind="stable"):
             times, weight, most = found[0][k], float(found[1][k]), float(found[2][k])
             if most < best.value - _TIE:
