@@ -196,7 +196,7 @@ def beyond_levels(problem: ExactProblem, settings: ExactSettings) -> float:
     prior = problem.prior.arrays(problem.levels.variables)
     clock, order = _Clock(settings.seconds), itertools.count()
     heap: list[tuple[float, int, Node]] = []
-    limits = gain_bound(prior, problem.levels, problem.levels.resolution)
+    limits = gain_bound(prior, problem.levels, problem.slot, problem.levels.resolution)
     with Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads) as bounds:
         nodes = [everywhere(problem.levels, *kind) for kind in problem.kinds]
         while True:
@@ -243,9 +243,8 @@ class _Search:
         self.sides, _ = problem.levels.arrays()
         self.prior = problem.prior.arrays(problem.levels.variables)
         self.slot = problem.slot or Slot.alone(len(problem.levels.variables))
-        self.bounds = Bounds(
-            problem.coded, problem.gaps, problem.worth, gain_bound(self.prior, problem.levels), settings.threads
-        )
+        limits = gain_bound(self.prior, problem.levels, problem.slot)
+        self.bounds = Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads)
         self.rejected = float(problem.coded.weights[~problem.coded.positive].sum())
         self.best = _Best()
         self.heap: list[tuple[float, tuple[float, ...], int, Node]] = []
