@@ -16,6 +16,7 @@ from tests.strategies import random_trajectories
 from tickwise.inference.gains import gain_bound
 from tickwise.inference.kernels import Shape, satisfied
 from tickwise.inference.levels import Levels, code
+from tickwise.inference.prior import BoxPrior
 from tickwise.inference.scan import Worth, bound, bound_all, candidates, signature, tabulate, weigh
 from tickwise.inference.space import OPERATORS
 from tickwise.inference.trajectories import LabelledTrajectories
@@ -178,9 +179,25 @@ def test_the_bound_of_a_range_is_at_least_that_of_each_box(
             assert most == pytest.approx(max(values), abs=1e-14)
 
 
-def two_boxes():
-    from tickwise.inference.prior import BoxPrior
+def test_a_gain_without_end_that_does_not_count():
+    """The probability of 36 ticks in a row in a tiny box is less than the least float64."""
+    levels = Levels(("x",), (np.array([0.0, 1e-9, 1.0]),), True, np.array([1e-9]))
+    values = np.zeros((36, 37, 1))
+    values[range(1, 36), range(1, 36)] = 0.5  # the others leave for a tick, so that no shorter stay tells them apart
+    data = LabelledTrajectories.from_arrays(values, [1] + [-1] * 35, ("x",))
+    coded = code(data, np.ones(36), levels, 36)
+    limits = gain_bound(BoxPrior({"x": (0.0, 1.0)}, 36).arrays(("x",)), levels)
+    node, gaps = box_node(True, False, (0,), (1,)), np.array([[0, 36]])
+    table, times = np.empty((37, 37, 37)), np.empty(3, dtype=np.int64)
+    worth = Worth(0.0, 36.0, True, True, 0.0, 0.0)
+    assert bound(coded, node, gaps, worth, limits, table, times) == 1.0
+    assert times.tolist() == [0, 1, 35]
+    assert candidates(coded, node, gaps, worth, limits, 37, 1.0, np.inf)[0].tolist() == [[0, 1, 35]]
+    dear = worth._replace(information_weight=0.1)
+    assert bound(coded, node, gaps, dear, limits, table, times) == np.inf
 
+
+def two_boxes():
     return BoxPrior({"y": (-1.0, 5.0), "x": (-0.5, 3.5)}, 8)
 
 

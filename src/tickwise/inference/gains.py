@@ -24,7 +24,7 @@ class GainBound(NamedTuple):
         horizon: The prior's last tick L.
         most: The bound where they are not.
         held: The gain of the primitives in conjunction with the searched one, at other ticks; 0 if there is none.
-        beside: The gain of the other disjuncts, which that of the whole formula is not above; infinite if there is none.
+        beside: The gain of the other disjuncts, the most that the whole formula can gain; infinite if there is none.
         places: For each variable and level the share of the prior's range below it, shape ``(variables, levels)``.
         least: The least positive share between two levels of each variable, shape ``(variables,)``.
     """
