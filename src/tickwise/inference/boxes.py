@@ -95,7 +95,7 @@ def split_between(node: Node) -> list[Node]:
     return [half for half in halves if (ranges(half)[0, 0] < ranges(half)[1, 1]).all()]
 
 
-def first_key(node: Node, levels: Levels, nested: bool) -> tuple[int, ...]:
+def first_key(node: Node, levels: Levels, *, nested: bool) -> tuple[int, ...]:
     """Where the first of a node's boxes stands among primitives of equal worth.
 
     In this order: the fewest closed sides of variables whose sides may be open; ◇ and □ before ◇□ and □◇; the plain

@@ -217,7 +217,7 @@ def beyond_levels(problem: ExactProblem, settings: ExactSettings) -> float:
     prior = problem.prior.arrays(problem.levels.variables)
     clock, order = _Clock(settings.seconds), itertools.count()
     heap: list[tuple[float, int, Node]] = []
-    limits = gain_bound(prior, problem.levels, problem.levels.resolution)
+    limits = gain_bound(prior, problem.levels, problem.slot, problem.levels.resolution)
     with Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads) as bounds:
         nodes = [everywhere(problem.levels, *kind) for kind in problem.kinds]
         while True:
@@ -264,9 +264,8 @@ class _Search:
         self.sides, _ = problem.levels.arrays()
         self.prior = problem.prior.arrays(problem.levels.variables)
         self.slot = problem.slot or Slot.alone(len(problem.levels.variables))
-        self.bounds = Bounds(
-            problem.coded, problem.gaps, problem.worth, gain_bound(self.prior, problem.levels), settings.threads
-        )
+        limits = gain_bound(self.prior, problem.levels, problem.slot)
+        self.bounds = Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads)
         self.rejected = float(problem.coded.weights[~problem.coded.positive].sum())
         self.best = _Best(least)
         self.heap: list[tuple[float, tuple[float, ...], int, Node]] = []
@@ -274,23 +273,25 @@ class _Search:
         self.nodes = 0
 
     def run(self) -> ExactResult | None:
-        clock, interrupted, bound = _Clock(self.settings.seconds), False, -math.inf
+        clock, interrupted, bound = _Clock(self.settings.seconds), False, math.inf
         with self.bounds:
             try:
                 kinds, roots = self.problem.kinds, self.problem.roots
                 self._push([root(self.problem.levels, *kind) for kind in kinds] if roots is None else list(roots))
                 batches = 0
                 while self.heap:
+                    bound = -self.heap[0][0]  # of all that is left, also while some of it is taken off the heap
                     full = len(self.heap) > self.settings.nodes
-                    if full or (clock.over and self._started):
-                        bound = -self.heap[0][0]
+                    if (full or clock.over) and self._started:
                         break
                     self._step(dive=batches < _DIVES)
                     batches += 1
+                else:
+                    bound = -math.inf
             except KeyboardInterrupt:
                 if not self._started:
                     raise
-                interrupted, bound = True, -self.heap[0][0] if self.heap else math.inf
+                interrupted = True
         return None if self.best.node is None else self._result(max(bound, self.best.value), interrupted)
 
     @property
@@ -326,7 +327,7 @@ class _Search:
 
     def _push(self, nodes: list[Node]) -> None:
         for node, bound in zip(nodes, self.bounds(nodes), strict=True):
-            key = first_key(node, self.problem.levels, not self.problem.worth.plain)
+            key = first_key(node, self.problem.levels, nested=not self.problem.worth.plain)
             if self.best.beaten_by(bound, key):
                 heapq.heappush(self.heap, (-round(bound, 13), key, next(self.order), node))
         self.nodes += len(nodes)
@@ -341,7 +342,8 @@ class _Search:
         enough = best.value - TIE
         found = candidates(problem.coded, node, *self.bounds.arguments, enough, floor)
         informed = worth.information_weight > 0
-        neighbours = [(near, self._floor(near)) for near in tighter(node, problem.levels)] if informed else []
+        near_ones = tighter(node, problem.levels) if informed and best.node is not None else ()
+        neighbours = [(near, self._floor(near)) for near in near_ones]
         for k in np.argsort(-found[2], kind="stable"):
             times, weight, most = found[0][k], float(found[1][k]), float(found[2][k])
             if most < best.value - TIE:
@@ -350,7 +352,7 @@ class _Search:
                 continue
             logarithm = self._log_probability(node, times, lower, upper) if informed else 0.0
             value = self._value(times, weight, logarithm)
-            key = (*first_key(node, problem.levels, times[2] > 0), *_times_key(node, times))
+            key = (*first_key(node, problem.levels, nested=times[2] > 0), *_times_key(node, times))
             if best.beaten_by(value, key):
                 best = self.best = _Best(value, key, node, times, weight, logarithm)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tickwise._jit import njit
 from tickwise.inference.kernels import PriorArrays
 from tickwise.inference.levels import Levels
+from tickwise.inference.slot import Slot
 
 EXISTENTIAL, COMPLEMENTED, SIDES = 0, 1, 2
 """Where a node says ◇ or ◇□ rather than □ or □◇, the polarity, and where its sides begin."""
@@ -22,6 +23,8 @@ class GainBound(NamedTuple):
         independent: Whether ticks are independent draws, of which the measure of a box is known.
         horizon: The prior's last tick L.
         most: The bound where they are not.
+        held: The gain of the primitives in conjunction with the searched one, at other ticks; 0 if there is none.
+        beside: The gain of the other disjuncts, the most that the whole formula can gain; infinite if there is none.
         places: For each variable and level the share of the prior's range below it, shape ``(variables, levels)``.
         least: The least positive share between two levels of each variable, shape ``(variables,)``.
     """
@@ -29,16 +32,24 @@ class GainBound(NamedTuple):
     independent: bool
     horizon: int
     most: float
+    held: float
+    beside: float
     places: NDArray[np.float64]
     least: NDArray[np.float64]
 
 
-def gain_bound(prior: PriorArrays, levels: Levels, resolution: NDArray[np.float64] | None = None) -> GainBound:
-    """What bounds the information gain of one primitive alone, and so that of a formula with it.
+def gain_bound(
+    prior: PriorArrays,
+    levels: Levels,
+    slot: Slot | None = None,
+    resolution: NDArray[np.float64] | None = None,
+) -> GainBound:
+    """What bounds the information gain of a primitive, and of the formula that it is part of.
 
     Args:
         prior: The prior's arrays.
         levels: The levels.
+        slot: The formula that it is part of; None for the primitive alone.
         resolution: The least distance between the two sides of each variable; None for that of two levels.
     """
     sides, counts = levels.arrays()
@@ -51,34 +62,42 @@ def gain_bound(prior: PriorArrays, levels: Levels, resolution: NDArray[np.float6
             least[variable] = steps[steps > 0].min() if (steps > 0).any() else 1.0
         if resolution is not None:
             least = np.minimum(least, resolution / width[:, 0])
-    return GainBound(prior.independent, prior.horizon, prior.most, shares, least)
+    held, beside = slot.held_gains(prior) if slot else (0.0, np.inf)
+    return GainBound(prior.independent, prior.horizon, prior.most, held, beside, shares, least)
 
 
 @njit
-def _least_measure(node: NDArray[np.int64], prior: GainBound) -> float:
-    """A positive lower bound on the probability of the predicate at one tick, over the boxes of a node."""
+def _least_measure(node: NDArray[np.int64], prior: GainBound) -> tuple[float, bool]:
+    """The least positive probability of the predicate at one tick, over the boxes of a node, or less.
+
+    Returns:
+        The bound, and whether there may be boxes whose predicate is impossible.
+    """
     width = (len(node) - SIDES) // 4
-    inner, outer, border = 1.0, 1.0, 1.0
+    inner, outer, border, empty = 1.0, 1.0, 1.0, False
     for variable in range(width):
         lo_min, lo_max = node[SIDES + variable], node[SIDES + width + variable]
         hi_min, hi_max = node[SIDES + 2 * width + variable], node[SIDES + 3 * width + variable]
         places = prior.places[variable]
         share = places[hi_min] - places[lo_max] if hi_min > lo_max else 0.0
         inner *= share if share > 0 else prior.least[variable]
+        empty = empty or share <= 0
         outer *= places[hi_max] - places[lo_min]
         border = min(border, prior.least[variable])
     if node[COMPLEMENTED] == 1:
-        return 1.0 - outer if outer < 1.0 else border
-    return inner
+        return (1.0 - outer, False) if outer < 1.0 else (border, True)
+    return inner, empty
 
 
 @njit
 def gain_bounds(node: NDArray[np.int64], prior: GainBound, ticks: int) -> NDArray[np.float64]:
     """Upper bounds on the information gain, for a window of b - a + 1 ticks and a duration c at ``[b - a, c]``."""
-    bounds = np.full((ticks, ticks), prior.most)
+    bounds = np.full((ticks, ticks), min(prior.most, prior.beside))
     if not prior.independent:
         return bounds
-    holds = _least_measure(node, prior)
+    holds, impossible = _least_measure(node, prior)
+    if impossible and prior.beside < np.inf:  # where the primitive says nothing, the other disjuncts say all
+        return bounds
     for duration in range(ticks):
         needed = duration + 1
         if node[EXISTENTIAL] == 1:
@@ -98,4 +117,4 @@ def gain_bounds(node: NDArray[np.int64], prior: GainBound, ticks: int) -> NDArra
                 places = span + 1 + duration
                 cost = min(-np.log(holds) * (places // needed), block * ((places + half - 1) // half))
                 bounds[span, duration] = cost / prior.horizon
-    return bounds
+    return np.minimum(bounds + prior.held, prior.beside)

@@ -201,6 +201,14 @@ def _sum_up(view: NDArray[np.float64], right: float, never: NDArray[np.float64])
 
 
 @njit
+def _gains(node: NDArray[np.int64], prior: GainBound, worth: Worth, ticks: int) -> NDArray[np.float64]:
+    """What the information gain of a node's primitives is worth at most; 0 where it does not count."""
+    if worth.information_weight == 0:
+        return np.zeros((ticks, ticks))
+    return worth.information_weight * gain_bounds(node, prior, ticks)
+
+
+@njit
 def bound(
     coded: Coded,
     node: NDArray[np.int64],
@@ -228,12 +236,12 @@ def bound(
     for gap in range(len(gaps)):
         first, last = gaps[gap, 0], gaps[gap, 1]
         view = tabulate(coded, node, first, last, table)
-        gains = gain_bounds(node, prior, len(view))
+        gains = _gains(node, prior, worth, len(view))
         for a in range(len(view)):
             for b in range(a + 1, len(view)):
                 for duration in range(0 if worth.plain else 1, len(view) - b if worth.nested else 1):
                     value = (worth.base + view[a, b, duration]) / worth.total
-                    value += worth.information_weight * gains[b - a, duration]
+                    value += gains[b - a, duration]
                     value -= worth.nesting_cost if duration else 0.0
                     if value > most:
                         most = value
@@ -292,12 +300,12 @@ def candidates(
     for gap in range(len(gaps)):
         first, last = gaps[gap, 0], gaps[gap, 1]
         view = tabulate(coded, node, first, last, table)
-        gains = gain_bounds(node, prior, len(view))
+        gains = _gains(node, prior, worth, len(view))
         for a in range(len(view)):
             for b in range(a + 1, len(view)):
                 for duration in range(0 if worth.plain else 1, len(view) - b if worth.nested else 1):
                     value = (worth.base + view[a, b, duration]) / worth.total
-                    value += worth.information_weight * gains[b - a, duration]
+                    value += gains[b - a, duration]
                     value -= worth.nesting_cost if duration else 0.0
                     if value < enough or _dominated(view, a, b, duration, node[EXISTENTIAL] == 1, floor):
                         continue

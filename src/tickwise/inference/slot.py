@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,3 +64,32 @@ class Slot:
         for array, row in zip(whole, (times, lower, upper), strict=True):
             array[self.index] = row
         return float(log_probability(prior, shape, *whole))
+
+    def held_gains(self, prior: PriorArrays) -> tuple[float, float]:
+        """The information gain of what is held in the disjunct of the searched primitive, and of the other disjuncts.
+
+        Args:
+            prior: The prior's arrays.
+
+        Returns:
+            Two gains. That of the other disjuncts is infinite where there is none or they are impossible. The other one
+            is 0 where there is nothing else in the disjunct, or where the whole formula is impossible.
+        """
+        starts = self.shape.starts
+        own = int(np.searchsorted(starts, self.index, side="right")) - 1
+        within = np.arange(starts[own], starts[own + 1])
+        others = np.delete(np.arange(starts[-1]), within)
+        lengths = np.delete(np.diff(starts), own)
+        held = self._gain(prior, within[within != self.index], np.array([len(within) - 1]))
+        beside = self._gain(prior, others, lengths) if len(others) else math.inf
+        return (0.0 if math.isinf(held) and math.isinf(beside) else held), beside
+
+    def _gain(self, prior: PriorArrays, rows: NDArray[np.int64], lengths: NDArray[np.int64]) -> float:
+        """The gain of disjuncts made of some of the primitives; infinite where they are impossible, 0 of none."""
+        if not len(rows):
+            return 0.0
+        starts = np.concatenate([np.zeros(1, np.int64), np.cumsum(lengths)])
+        shape = Shape(starts, self.shape.operators[rows], self.shape.complemented[rows])
+        return (
+            -float(log_probability(prior, shape, self.times[rows], self.lower[rows], self.upper[rows])) / prior.horizon
+        )
