@@ -22,11 +22,12 @@ from tickwise.experiments.measures import block_means, goal_reached
 from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import Collection, StudySpec
+from tickwise.inference.fit import Fit
 from tickwise.inference.information import information_gain
 from tickwise.inference.prior import PathPrior
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
-from tickwise.inference.template import Fit, fit_transferable
+from tickwise.inference.template import fit_transferable
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.inference.tree import DecisionTree, InferenceSettings, classification_rate
 from tickwise.logic.parse import parse

@@ -12,14 +12,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError, DataError
+from tickwise.inference.exact import ExactSettings
+from tickwise.inference.growth import infer_jointly
 from tickwise.inference.objective import ClassWeight
 from tickwise.inference.prior import BoxPrior, Prior
+from tickwise.inference.readable import readable
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.inference.tree import DecisionTree, InferenceSettings, infer_tree, is_satisfying
 from tickwise.logic.sdnf import SDNF
 from tickwise.logic.syntax import Verdict
+
+SEARCHES = ("exact", "joint", "swarm")
+"""How parameters may be searched."""
 
 
 class MITLClassifier:
@@ -30,7 +36,7 @@ class MITLClassifier:
 
     Attributes:
         formula_: The formula in SDNF; None if no leaf of the tree has label 1 (then all is predicted -1).
-        tree_: The decision tree.
+        tree_: The decision tree; None where all primitives were found together (``search="joint"``).
         classes_: The labels, ``[-1, 1]``.
         variables_: Names of the columns of ``X``.
         satisfying_: Whether the formula is a satisfying formula for the training data (Problem 1).
@@ -44,13 +50,14 @@ class MITLClassifier:
         rate: float = 0.95,
         information_weight: float = 0.01,
         depth: int = 2,
-        search: str = "swarm",
+        search: str = "exact",
         class_weight: ClassWeight = None,
         random_state: int = 0,
         variables: Sequence[str] | None = None,
         prior: Prior | None = None,
         space: SearchSpace | None = None,
         swarm: SwarmSettings | None = None,
+        limits: ExactSettings | None = None,
     ) -> None:
         """Store the parameters.
 
@@ -59,13 +66,15 @@ class MITLClassifier:
             rate: ζ, the least classification rate of a satisfying formula.
             information_weight: λ, the weight of the information gain.
             depth: h_max, the tree's greatest depth.
-            search: How parameters are searched; ``"swarm"``.
+            search: How parameters are searched: ``"exact"`` gives every node of the greedy tree its best primitive,
+                with proof; ``"joint"`` finds all primitives of a formula together; ``"swarm"`` is the paper's.
             class_weight: None, ``"balanced"`` or a mapping from label to weight.
             random_state: The seed, a whole number of 0 or more.
             variables: Names of the columns of ``X``; ``x0, x1, …`` if None.
             prior: The prior of the information gain; if None, independent uniform draws over the data's range.
             space: What boxes and times may be chosen; if None, any over the data's range.
             swarm: How hard the swarm searches.
+            limits: The limits of an exact search.
         """
         self.size = size
         self.rate = rate
@@ -78,6 +87,7 @@ class MITLClassifier:
         self.prior = prior
         self.space = space
         self.swarm = swarm
+        self.limits = limits
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:  # noqa: ARG002 (scikit-learn's signature)
         """The parameters by name."""
@@ -120,8 +130,8 @@ class MITLClassifier:
             ConfigurationError: If a parameter is out of range.
             DataError: If the data is malformed, or has only one label.
         """
-        if self.search != "swarm":
-            raise ConfigurationError(f"search is {self.search!r}; use 'swarm'")
+        if self.search not in SEARCHES:
+            raise ConfigurationError(f"search is {self.search!r}; use {', '.join(map(repr, SEARCHES))}")
         if isinstance(self.random_state, bool) or not isinstance(self.random_state, (int, np.integer)):
             raise ConfigurationError(f"random_state is {self.random_state!r}; use a whole number of 0 or more")
         if self.random_state < 0:
@@ -130,10 +140,16 @@ class MITLClassifier:
         data = LabelledTrajectories.from_arrays(X, y, self.variables).require_both_classes()
         space = SearchSpace.from_data(data) if self.space is None else self.space
         prior = self._box_prior(data, space) if self.prior is None else self.prior
-        rng = generator(int(self.random_state), "inference")
-        swarm = SwarmSettings() if self.swarm is None else self.swarm
-        self.tree_: DecisionTree = infer_tree(data, prior, space, settings, swarm, rng)
-        self.formula_: SDNF | None = self.tree_.formula
+        limits = ExactSettings() if self.limits is None else self.limits
+        self.tree_: DecisionTree | None = None
+        if self.search == "joint":
+            found: SDNF | None = infer_jointly(data, prior, space, settings, limits).formula
+        else:
+            swarm = SwarmSettings() if self.swarm is None else self.swarm
+            rng = generator(int(self.random_state), "inference")
+            self.tree_ = infer_tree(data, prior, space, settings, limits if self.search == "exact" else swarm, rng)
+            found = self.tree_.formula
+        self.formula_: SDNF | None = None if found is None else readable(found, data, space)
         self.satisfying_: bool = is_satisfying(self.formula_, data, settings)
         self.classes_ = np.array([-1, 1])
         self.variables_ = data.variables
@@ -157,7 +173,7 @@ class MITLClassifier:
         Raises:
             DataError: If the estimator is not fitted, or the data is malformed.
         """
-        if not hasattr(self, "tree_"):
+        if not hasattr(self, "formula_"):
             raise DataError("this MITLClassifier is not fitted yet; call fit first")
         data = LabelledTrajectories.from_arrays(X, np.ones(len(X)), self.variables_)  # type: ignore[arg-type]
         if self.formula_ is None:

@@ -68,6 +68,16 @@ def filled(draft: Draft, i: int, j: int, primitive: Primitive | None) -> Draft:
     return (*draft[:i], row, *draft[i + 1 :])
 
 
+def structure_of(pairs: Sequence[Sequence[tuple[Operator, bool]]]) -> Structure:
+    """The structure whose operators and polarities are given, a row of pairs a disjunct."""
+    return tuple(tuple(Choice((operator,), (flag,)) for operator, flag in row) for row in pairs)
+
+
+def draft_of(formula: SDNF) -> Draft:
+    """The draft of a formula."""
+    return tuple(tuple(disjunct.primitives) for disjunct in formula.disjuncts)
+
+
 def formula_of(draft: Draft) -> SDNF:
     """The formula of a draft, places that are not filled left out."""
     rows = [tuple(primitive for primitive in row if primitive is not None) for row in draft]
@@ -135,13 +145,16 @@ class Drafter:
 
     def value(self, draft: Draft) -> float:
         """J of a draft whose places are all filled, less what its nested operators cost."""
-        value = self.rate(draft) - self._cost(draft)
         if self.information_weight == 0:
-            return value
+            return self.rate(draft) - self._cost(draft)
+        rate, gain = self.parts(draft)
+        return rate + self.information_weight * gain - self._cost(draft)
+
+    def parts(self, draft: Draft) -> tuple[float, float]:
+        """Classification rate and information gain of a draft whose places are all filled."""
         arrays = to_arrays(formula_of(draft), self.data.variables)
         logarithm = float(log_probability(self.prior.arrays(self.data.variables), *arrays))
-        gain = 0.0 if math.isinf(logarithm) else -logarithm / self.prior.horizon
-        return value + self.information_weight * gain
+        return self.rate(draft), 0.0 if math.isinf(logarithm) else -logarithm / self.prior.horizon + 0.0
 
     @cached_property
     def trivial(self) -> float:

@@ -66,6 +66,8 @@ class ExactSettings:
         seconds: The most time one search may take; None for as long as it takes.
         nodes: The most nodes it may hold at a time, some 300 bytes each.
         threads: Threads that bound nodes side by side; the result does not depend on it.
+        joint: Whether all primitives of a formula are found together (see `tickwise.inference.growth`), rather than one
+            after the other by the greedy tree of Algorithm 1.
 
     Raises:
         ConfigurationError: If a limit is out of its range.
@@ -75,6 +77,7 @@ class ExactSettings:
     seconds: float | None = None
     nodes: int = 2_000_000
     threads: int = 1
+    joint: bool = False
 
     def __post_init__(self) -> None:
         for name in ("levels", "nodes", "threads"):

@@ -9,43 +9,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError
+from tickwise.inference.draft import Drafter, draft_of, formula_of, structure_of
+from tickwise.inference.exact import ExactSettings
+from tickwise.inference.fit import Fit
+from tickwise.inference.joint import fit_jointly
 from tickwise.inference.objective import Objective, formula_signature, trajectory_weights
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import SearchSpace, shape_of
 from tickwise.inference.starts import sampled_starts
 from tickwise.inference.swarm import SwarmResult, SwarmSettings, maximise
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.inference.tree import InferenceSettings
+from tickwise.inference.tree import InferenceSettings, Search
 from tickwise.logic.sdnf import SDNF, Operator
 
 _COVERINGS = 6  # starts by covering of each search over several disjuncts
 
 Structure = Sequence[Sequence[Operator | str]]
 """For each disjunct the temporal operators of its primitives, in order, such as ``(("FG", "F"),)``."""
-
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """A formula of a fixed structure, with the parameters that a search found best.
-
-    Attributes:
-        formula: The formula.
-        objective: J = CR + λ I, with class weights in CR.
-        rate: The classification rate CR.
-        gain: The information gain I.
-        satisfying: Whether it is a satisfying formula (Problem 1).
-    """
-
-    formula: SDNF
-    objective: float
-    rate: float
-    gain: float
-    satisfying: bool
-
-    @property
-    def size(self) -> int:
-        """The size ϱ(φ)."""
-        return self.formula.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +54,14 @@ def fit_structure(
     space: SearchSpace,
     structure: Structure | SDNF,
     settings: InferenceSettings,
-    swarm: SwarmSettings,
+    search: Search,
     rng: np.random.Generator,
     *,
     start: SDNF | None = None,
 ) -> Fit:
     """Optimise all parameters of one formula together, its operators fixed.
+
+    An exact search goes through the primitives one at a time, from many beginnings (see `tickwise.inference.joint`).
 
     A swarm moves all parameters at once. Then each primitive in turn is searched anew with the others held, until none
     gets better: windows of neighbours push each other, and a joint move that keeps all good is rare. All of this is
@@ -92,8 +74,8 @@ def fit_structure(
         space: What boxes and times may be chosen.
         structure: A source formula, which gives operators and the polarity of each predicate, or the operators alone.
         settings: ζ, ϱ_th, λ and class weights.
-        swarm: How hard to search.
-        rng: The source of all randomness.
+        search: How to search: the settings of a swarm, or the limits of an exact search.
+        rng: The source of all randomness; an exact search draws nothing.
         start: A formula whose disjuncts are a good guess for the first disjuncts.
 
     Returns:
@@ -113,6 +95,26 @@ def fit_structure(
             "use a longer horizon"
         )
     weights = trajectory_weights(data.labels, settings.class_weight)
+    if isinstance(search, ExactSettings):
+        drafter = Drafter(data, weights, prior, space, settings.information_weight, 0.0, search)
+        found = fit_jointly(drafter, structure_of(pairs), None if start is None else draft_of(start))
+        assert found is not None  # there is room for the structure
+        return Fit.of(formula_of(found), *drafter.parts(found), settings)
+    return _fit_by_swarm(data, prior, space, pairs, settings, search, rng, start)
+
+
+def _fit_by_swarm(
+    data: LabelledTrajectories,
+    prior: Prior,
+    space: SearchSpace,
+    pairs: Sequence[Sequence[tuple[Operator, bool]]],
+    settings: InferenceSettings,
+    swarm: SwarmSettings,
+    rng: np.random.Generator,
+    start: SDNF | None,
+) -> Fit:
+    shape, gaps = shape_of(pairs), ((0, space.horizon),)
+    weights = trajectory_weights(data.labels, settings.class_weight)
     objective = Objective(data, weights, prior, space, shape, gaps, settings.information_weight)
     single = replace(swarm, restarts=1)
     position, value = np.zeros(0), -np.inf
@@ -124,9 +126,7 @@ def fit_structure(
         if found.value > value:
             position, value = found.position, found.value
     formula = objective.formula(position)
-    rate, gain = objective.parts(formula)
-    good = rate >= settings.rate and formula.size <= settings.size
-    return Fit(formula, value, rate, gain, good)
+    return Fit.of(formula, *objective.parts(formula), settings)
 
 
 def fit_transferable(
@@ -135,7 +135,7 @@ def fit_transferable(
     space: SearchSpace,
     source: SDNF,
     settings: InferenceSettings,
-    swarm: SwarmSettings,
+    search: Search,
     rng: np.random.Generator,
 ) -> TransferFit:
     """Step 2: look for a satisfying formula that is structurally transferable from the source (Definition 7).
@@ -149,7 +149,7 @@ def fit_transferable(
         space: The target's search space.
         source: φ^S, a satisfying formula of the source task.
         settings: ζ, ϱ_th, λ and class weights.
-        swarm: How hard to search.
+        search: How to search.
         rng: The source of all randomness.
 
     Returns:
@@ -164,7 +164,7 @@ def fit_transferable(
     while copies * source.size <= settings.size:
         previous = attempts[-1].formula if attempts else None
         structure = SDNF(source.disjuncts * copies)
-        attempts.append(fit_structure(data, prior, space, structure, settings, swarm, rng, start=previous))
+        attempts.append(fit_structure(data, prior, space, structure, settings, search, rng, start=previous))
         if attempts[-1].satisfying:
             noun = "formula" if copies == 1 else f"disjunction of {copies} formulas"
             reason = (

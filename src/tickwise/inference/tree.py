@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError, DataError
+from tickwise.inference.exact import ExactProblem, ExactSettings, exact_search, worth_of
+from tickwise.inference.levels import Levels, code
 from tickwise.inference.objective import ClassWeight, Objective, formula_signature, trajectory_weights
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import Gaps, SearchSpace, shape_of
@@ -22,6 +24,10 @@ STRUCTURES: tuple[tuple[Operator, bool], ...] = tuple(
     (operator, complemented) for complemented in (False, True) for operator in Operator
 )
 """The primitive structures 𝒫 and, by duality, their negations: (operator, whether the box is complemented)."""
+
+
+Search = SwarmSettings | ExactSettings
+"""How parameters are searched: the paper's particle swarm, or exactly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +65,16 @@ class InferenceSettings:
         if not self.nesting_cost >= 0:
             raise ConfigurationError(f"nesting_cost is {self.nesting_cost}; use 0 or more")
 
+    def nesting_penalty(self, trajectories: int, horizon: int) -> float:
+        """What the duration of a nested structure costs, in units of J.
+
+        Args:
+            trajectories: The number N of trajectories.
+            horizon: The prior's last tick L.
+        """
+        nats = self.nesting_cost * np.log(trajectories) / 2
+        return float(self.information_weight * nats / horizon)
+
 
 @dataclass(frozen=True, slots=True)
 class DecisionTree:
@@ -69,7 +85,8 @@ class DecisionTree:
         depth: h, 0 at the root.
         positives: How many trajectories with label 1 reach the node.
         negatives: How many with label -1.
-        stop: Why the node is a leaf: ``"I"`` (pure enough), ``"II"`` (deepest), ``"III"`` (no ticks left); else None.
+        stop: Why the node is a leaf: ``"I"`` (pure enough), ``"II"`` (deepest), ``"III"`` (no ticks left),
+            ``"interrupted"`` (Ctrl-C ended the search at a node before); else None.
         label: 1 or -1 at a leaf; else None.
         primitive: z.φ of a non-leaf node; else None.
         objective: J of the primitive at this node (0 at a leaf).
@@ -77,6 +94,8 @@ class DecisionTree:
         gain: I of the primitive (0 at a leaf).
         left: The node of the trajectories that satisfy the primitive.
         right: The node of those that violate it.
+        gap: How much better the best primitive of Υ_z can be at most, in units of J: 0 where it is proved to be the
+            best; None where the search was not exact.
     """
 
     path: tuple[Primitive, ...]
@@ -91,6 +110,7 @@ class DecisionTree:
     gain: float = 0.0
     left: DecisionTree | None = field(default=None)
     right: DecisionTree | None = field(default=None)
+    gap: float | None = None
 
     @property
     def leaf(self) -> bool:
@@ -135,7 +155,7 @@ def infer_tree(
     prior: Prior,
     space: SearchSpace,
     settings: InferenceSettings,
-    swarm: SwarmSettings,
+    search: Search,
     rng: np.random.Generator,
 ) -> DecisionTree:
     """Algorithm 1 from the root: S_L, φ^path = ⊤, h = 0.
@@ -143,15 +163,16 @@ def infer_tree(
     Structures are compared by the objective less the cost of a nested structure's duration (see
     `InferenceSettings.nesting_cost`; at 0 this is line 11 to the letter). Ties go to the structure that comes first in
     `STRUCTURES` (the plain box before its complement, then ◇, □, ◇□, □◇), and within a structure to the position found
-    first.
+    first. An exact search has a rule of its own (see `tickwise.inference.exact`); a Ctrl-C ends it with the best
+    primitive so far, and the tree with leaves below it.
 
     Args:
         data: Labelled trajectories S_L, with both labels.
         prior: The prior G_L of the information gain.
         space: What boxes and times may be chosen.
         settings: ζ, λ, h_max and class weights.
-        swarm: How hard to search.
-        rng: The source of all randomness.
+        search: How to search: the settings of a swarm, or the limits of an exact search.
+        rng: The source of all randomness; an exact search draws nothing.
 
     Returns:
         The root of the tree.
@@ -166,7 +187,7 @@ def infer_tree(
         raise ConfigurationError(
             f"the space has variables {', '.join(space.variables)}, the data {', '.join(data.variables)}; use the same"
         )
-    grower = _Grower(prior, space, settings, swarm)
+    grower = _Grower(prior, space, settings, search)
     tree = grower.grow(data, trajectory_weights(data.labels, settings.class_weight), (), 0, rng)
     if tree.label == 1:
         raise DataError(
@@ -177,11 +198,23 @@ def infer_tree(
 
 
 @dataclass(frozen=True, slots=True)
+class _Found:
+    """The primitive that line 11 chose, and what it is worth."""
+
+    primitive: Primitive
+    objective: float
+    rate: float
+    gain: float
+    gap: float | None = None
+    interrupted: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class _Grower:
     prior: Prior
     space: SearchSpace
     settings: InferenceSettings
-    swarm: SwarmSettings
+    search: Search
 
     def grow(
         self,
@@ -190,27 +223,33 @@ class _Grower:
         path: tuple[Primitive, ...],
         depth: int,
         rng: np.random.Generator,
+        interrupted: bool = False,
     ) -> DecisionTree:
         """Line 1: MITLtree(S, φ^path, h). No data stands for an empty set S."""
         labels = np.zeros(0, dtype=np.int8) if data is None else data.labels
         positives, negatives = int((labels == 1).sum()), int((labels == -1).sum())
         share = float(weights[labels == 1].sum() / weights.sum()) if len(weights) else 0.0
         gaps = self.space.gaps([(primitive.start, primitive.end) for primitive in path])
-        stop = self._stop(share, depth, gaps)
+        stop = self._stop(share, depth, gaps) or ("interrupted" if interrupted else None)
         if data is None or stop is not None:  # line 2
             # lines 3 to 7: a leaf, with label 1 if more than half of its trajectories have it
             label = 1 if share > 0.5 else -1
             return DecisionTree(path, depth, positives, negatives, stop, label)
         # lines 9 to 11: a non-leaf node with the best primitive over Υ_z, which the gaps are
-        primitive, objective, rate, gain = self._best(data, weights, gaps, rng)
+        best = self._best(data, weights, gaps, rng)
         # line 12: partition
-        whole = SDNF((SequentialConjunction((primitive,)),))
-        satisfied = formula_signature(whole, data)
+        primitive = best.primitive
+        satisfied = formula_signature(SDNF((SequentialConjunction((primitive,)),)), data)
         children = []
         for mask, step in ((satisfied, primitive), (~satisfied, primitive.negation)):  # lines 13 and 14
-            subset = data.select(mask) if mask.any() else None
-            children.append(self.grow(subset, weights[mask], (*path, step), depth + 1, rng.spawn(1)[0]))
-        return DecisionTree(path, depth, positives, negatives, None, None, primitive, objective, rate, gain, *children)
+            subset, below = data.select(mask) if mask.any() else None, (*path, step)
+            children.append(
+                self.grow(subset, weights[mask], below, depth + 1, rng.spawn(1)[0], interrupted=best.interrupted)
+            )
+        return DecisionTree(
+            path, depth, positives, negatives, None, None, primitive, best.objective, best.rate, best.gain, *children,
+            gap=best.gap,
+        )  # fmt: skip
 
     def _stop(self, share: float, depth: int, gaps: Gaps) -> str | None:
         if max(share, 1 - share) >= self.settings.rate:
@@ -219,15 +258,34 @@ class _Grower:
             return "II"
         return None if gaps else "III"
 
-    def _nesting_cost(self, trajectories: int) -> float:
-        """What a nested structure's duration costs, in units of J."""
-        nats = self.settings.nesting_cost * np.log(trajectories) / 2
-        return float(self.settings.information_weight * nats / self.prior.horizon)
-
     def _best(
         self, data: LabelledTrajectories, weights: NDArray[np.float64], gaps: Gaps, rng: np.random.Generator
-    ) -> tuple[Primitive, float, float, float]:
+    ) -> _Found:
         """Line 11: the primitive structure and parameters in Υ_z with the greatest objective."""
+        if isinstance(self.search, ExactSettings):
+            return self._exact(data, weights, gaps, self.search)
+        return self._by_swarm(data, weights, gaps, self.search, rng)
+
+    def _nesting_cost(self, data: LabelledTrajectories) -> float:
+        return self.settings.nesting_penalty(len(data), self.prior.horizon)
+
+    def _exact(
+        self, data: LabelledTrajectories, weights: NDArray[np.float64], gaps: Gaps, limits: ExactSettings
+    ) -> _Found:
+        levels = Levels.of(self.space, data, limits.levels)
+        coded = code(data, weights, levels, self.space.horizon)
+        worth = worth_of(coded, self.settings.information_weight, self._nesting_cost(data))
+        best = exact_search(ExactProblem(coded, levels, self.prior, gaps, worth), limits)
+        return _Found(best.primitive, best.objective, best.rate, best.gain, best.gap, best.interrupted)
+
+    def _by_swarm(
+        self,
+        data: LabelledTrajectories,
+        weights: NDArray[np.float64],
+        gaps: Gaps,
+        swarm: SwarmSettings,
+        rng: np.random.Generator,
+    ) -> _Found:
         winner: tuple[Primitive, float, Objective] | None = None
         most = -np.inf
         for operator, complemented in STRUCTURES:
@@ -235,18 +293,17 @@ class _Grower:
             if not self.space.room(shape, gaps):
                 continue
             objective = Objective(data, weights, self.prior, self.space, shape, gaps, self.settings.information_weight)
-            starts = sampled_starts(data, self.space, shape, self.swarm.restarts * self.swarm.particles // 2, rng)
+            starts = sampled_starts(data, self.space, shape, swarm.restarts * swarm.particles // 2, rng)
             lower, upper = self.space.bounds(shape)
-            found = maximise(objective, lower, upper, self.space.units(shape), self.swarm, rng, starts)
-            worth = found.value - (self._nesting_cost(len(data)) if operator.nested else 0.0)
+            found = maximise(objective, lower, upper, self.space.units(shape), swarm, rng, starts)
+            worth = found.value - (self._nesting_cost(data) if operator.nested else 0.0)
             if worth > most:
                 most = worth
                 formula = objective.formula(found.position)
                 winner = formula.disjuncts[0].primitives[0], found.value, objective
         assert winner is not None  # the gaps have room for ◇ at least
         primitive, value, objective = winner
-        rate, gain = objective.parts(SDNF((SequentialConjunction((primitive,)),)))
-        return primitive, value, rate, gain
+        return _Found(primitive, value, *objective.parts(SDNF((SequentialConjunction((primitive,)),))))
 
 
 def classification_rate(

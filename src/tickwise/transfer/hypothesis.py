@@ -11,13 +11,14 @@ from tickwise.automata.build import timed_automata
 from tickwise.automata.model import TimedAutomaton
 from tickwise.automata.ticks import TickTable
 from tickwise.errors import NotTransferableError
+from tickwise.inference.exact import ExactSettings
+from tickwise.inference.growth import infer_jointly
 from tickwise.inference.objective import formula_signature
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import SearchSpace
-from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.template import TransferFit, fit_structure, fit_transferable
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.inference.tree import DecisionTree, InferenceSettings, infer_tree, is_satisfying, pruned
+from tickwise.inference.tree import DecisionTree, InferenceSettings, Search, infer_tree, is_satisfying, pruned
 from tickwise.logic.sdnf import SDNF
 
 PARTS = ("tree", "source", "target")
@@ -38,13 +39,13 @@ class Hypothesis:
     """The outcome of Steps 1 and 2.
 
     Attributes:
-        tree: The source's decision tree (Algorithm 1).
+        tree: The source's decision tree (Algorithm 1); None where all primitives were found together.
         source: φ^S, or None where the tree has no leaf with label 1.
         source_satisfying: Whether φ^S is a satisfying formula (Problem 1).
         fit: The attempts of Step 2, or None where Step 1 failed.
     """
 
-    tree: DecisionTree
+    tree: DecisionTree | None
     source: SDNF | None
     source_satisfying: bool
     fit: TransferFit | None
@@ -74,7 +75,7 @@ def transfer_structure(
     source: Task,
     target: Task,
     settings: InferenceSettings,
-    swarm: SwarmSettings,
+    search: Search,
     source_rng: np.random.Generator,
     target_rng: np.random.Generator,
     done: Callable[[str], None] | None = None,
@@ -85,7 +86,7 @@ def transfer_structure(
         source: The source task's data.
         target: The target task's data.
         settings: The constraints of Problem 1 and the settings of Algorithm 1.
-        swarm: The settings of the particle swarm.
+        search: How to search: the settings of the particle swarm, or the limits of an exact search.
         source_rng: Draws of Step 1.
         target_rng: Draws of Step 2.
         done: Told which of `PARTS` is done, each in turn; for who shows progress or measures time.
@@ -93,23 +94,27 @@ def transfer_structure(
     Returns:
         What was inferred, and whether logical transferability is identified.
     """
-    tree = infer_tree(source.data, source.prior, source.space, settings, swarm, source_rng)
+    given = (source.data, source.prior, source.space, settings)
+    jointly = search if isinstance(search, ExactSettings) and search.joint else None
+    tree = infer_tree(*given, search, source_rng) if jointly is None else None
     if done is not None:
         done("tree")
-    formula = source_formula(tree, source, settings, swarm, source_rng)
+    formula = source_formula(tree, source, settings, search, source_rng) if tree else None
+    if jointly is not None:
+        formula = infer_jointly(*given, jointly).formula
     satisfying = is_satisfying(formula, source.data, settings)
     if done is not None:
         done("source")
     fit = None
     if formula is not None and satisfying:
-        fit = fit_transferable(target.data, target.prior, target.space, formula, settings, swarm, target_rng)
+        fit = fit_transferable(target.data, target.prior, target.space, formula, settings, search, target_rng)
         if done is not None:
             done("target")
     return Hypothesis(tree, formula, satisfying, fit)
 
 
 def source_formula(
-    tree: DecisionTree, source: Task, settings: InferenceSettings, swarm: SwarmSettings, rng: np.random.Generator
+    tree: DecisionTree, source: Task, settings: InferenceSettings, search: Search, rng: np.random.Generator
 ) -> SDNF | None:
     """The formula of a decision tree, pruned; where it is not satisfying, its parameters are optimised together.
 
@@ -121,7 +126,7 @@ def source_formula(
         tree: The source's decision tree.
         source: The source task's data.
         settings: The constraints of Problem 1.
-        swarm: The settings of the particle swarm.
+        search: How to search: the settings of the particle swarm, or the limits of an exact search.
         rng: The source of all randomness.
 
     Returns:
@@ -134,7 +139,7 @@ def source_formula(
     main = max(formula.disjuncts, key=lambda disjunct: formula_signature(SDNF((disjunct,)), positives).sum())
     for start in dict.fromkeys((SDNF((main,)), formula)):
         if start.size <= settings.size:
-            fit = fit_structure(source.data, source.prior, source.space, start, settings, swarm, rng, start=start)
+            fit = fit_structure(source.data, source.prior, source.space, start, settings, search, rng, start=start)
             if fit.satisfying:
                 return fit.formula
     return formula
