@@ -31,6 +31,7 @@ from tickwise.logic.parse import parse
 from tickwise.rl.kernels import greedy_returns
 from tickwise.rl.qlearning import Problem, QSettings, learn
 from tickwise.rl.states import automaton_memory
+from tickwise.rl.stream import take_stream
 
 FORMULA = "F[0,22] G[0,5] (5 <= x <= 6 & 6 <= y <= 7) & F[31,40] (4 <= x <= 7 & 0 <= y <= 2)"
 SETTINGS = QSettings(epsilon=0.02)
@@ -91,7 +92,7 @@ def run_ours(problem: Problem, episodes: int) -> Run:
     begin = time.process_time()
     learn(problem, q, SETTINGS, learner, episodes)
     learned = time.process_time()
-    greedy_returns(*problem.arrays, player, q, returns)
+    greedy_returns(*problem.arrays, take_stream(player), q, returns)
     return Run(learned - begin, time.process_time() - learned, q)
 
 
