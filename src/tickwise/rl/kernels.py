@@ -59,7 +59,8 @@ def q_learning(
     ``q`` has shape ``(memory states, states, actions)``. ``returns``, shape ``(episodes,)``, is filled with
     the undiscounted return of each episode. ``paths``, shape ``(episodes, horizon + 1)``, is filled with the
     MDP states of each episode and -1 after its end; shape ``(0, 0)`` records nothing. The rest is the
-    problem's arrays, the settings and the generator; see `tickwise.rl.qlearning`.
+    problem's arrays, the settings and the generator's stream; see `tickwise.rl.qlearning` and
+    `tickwise.rl.stream`.
     """
     actions = successor.shape[1]
     outcomes = successor.shape[2]
@@ -81,16 +82,19 @@ def q_learning(
                 action = _index(number / epsilon * actions)
             else:
                 ties = 0
-                for a in range(actions):
-                    ties += q[u, s, a] == best
-                pick = int((number - epsilon) / (1.0 - epsilon) * ties)
                 action = _index(0)
                 for a in range(actions):
                     if q[u, s, a] == best:
-                        if pick == 0:
-                            action = _index(a)
-                            break
-                        pick -= 1
+                        action = _index(a)
+                        ties += 1
+                if ties > 1:
+                    pick = int((number - epsilon) / (1.0 - epsilon) * ties)
+                    for a in range(actions):
+                        if q[u, s, a] == best:
+                            if pick == 0:
+                                action = _index(a)
+                                break
+                            pick -= 1
             chance = uniform(stream)
             outcome = _index(0)
             while outcome < outcomes - 1 and chance >= thresholds[s, action, outcome]:
@@ -153,10 +157,9 @@ def greedy_returns(
         for t in range(1, horizon + 1):
             chance = uniform(stream)
             action = _index(0)
-            best = q[u, s, 0]
             for a in range(1, actions):
-                if q[u, s, a] > best:
-                    best = q[u, s, a]
+                # not against a running maximum: that becomes a chain of selections, where this is a jump well foreseen
+                if q[u, s, a] > q[u, s, action]:
                     action = _index(a)
             outcome = _index(0)
             while outcome < outcomes - 1 and chance >= thresholds[s, action, outcome]:

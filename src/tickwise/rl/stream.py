@@ -29,7 +29,9 @@ def take_stream(rng: np.random.Generator) -> NDArray[np.uint64]:
     """
     kind = type(rng.bit_generator).__name__
     if kind != "PCG64":
-        raise ConfigurationError(f"learning draws from PCG64, and the generator is of {kind}; use np.random.default_rng")
+        raise ConfigurationError(
+            f"learning draws from PCG64, and the generator is of {kind}; use np.random.default_rng"
+        )
     state = rng.bit_generator.state["state"]
     return np.array([half for name in ("state", "inc") for half in divmod(state[name], _WORD)], dtype=np.uint64)
 
