@@ -55,8 +55,8 @@ def contest(
         contenders: Who does it; the first is the one that answers are compared with.
         axis: What `size` counts.
         size: How much of it.
-        agree: Whether two answers, the first's and another's, are of the same work; asked of all that have the
-            first's number of units and repetitions. None asks nothing.
+        agree: Whether two answers, the first's and another's, are the same; asked of the last answers of all that
+            have the first's units of work. None asks nothing.
         clock: Says the time in seconds; by default this process's processor time.
 
     Returns:
@@ -85,7 +85,7 @@ def contest(
                 seconds[one.name].append(clock() - begin)
     first = contenders[0]
     for one in contenders[1:]:
-        comparable = one.name in answers and (one.work, one.repetitions) == (first.work, first.repetitions)
+        comparable = one.name in answers and one.work == first.work
         if agree is not None and comparable and not agree(answers[first.name], answers[one.name]):
             raise SystemExit(f"{benchmark} at size {size}: {one.name} and {first.name} do not agree")
     return [
