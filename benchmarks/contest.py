@@ -29,12 +29,14 @@ class Contender:
             not timed either: it compiles. An `ImportError` or `UnavailableError` means that it is skipped.
         work: Units of work in a repetition: a slow contender is given less.
         repetitions: How often it is timed.
+        warm: Whether there is such a first turn.
     """
 
     name: str
     prepare: Callable[[], Turn]
     work: float
     repetitions: int
+    warm: bool = True
 
 
 def contest(
@@ -70,7 +72,8 @@ def contest(
     for one in contenders:
         try:
             turns[one.name] = one.prepare()
-            turns[one.name]()
+            if one.warm:
+                turns[one.name]()
         except (ImportError, UnavailableError) as error:
             turns.pop(one.name, None)
             skipped[one.name] = str(error).splitlines()[0]
