@@ -8,8 +8,9 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
-from benchmarks.result import OURS, Result
+from benchmarks.result import OURS, Result, duration
 
 # Okabe and Ito's colours, which the colour-blind tell apart; markers differ too.
 _STYLES = {OURS: ("#0072B2", "o"), "C": ("#000000", "s")}
@@ -81,7 +82,9 @@ def _panel(axes: Axes, benchmark: str, axis: str, lines: Lines, styles: dict[str
     sizes = sorted({one.size for line in lines.values() for one in line})
     _sizes_on_axis(axes, sizes)
     axes.set_xlabel(_LABELS[axis])
-    axes.set_ylabel(f"seconds per {unit}")
+    axes.set_ylabel(f"time per {unit}")
+    axes.yaxis.set_major_formatter(lambda cost, _: duration(cost))
+    axes.yaxis.set_minor_formatter(NullFormatter())
     axes.set_title(benchmark, loc="left", fontweight="bold", fontsize=10)
     axes.grid(True, which="major", color="#DDDDDD", linewidth=0.6)
     axes.spines[["top", "right"]].set_visible(False)
@@ -106,15 +109,40 @@ def _widen(axes: Axes) -> None:
 
 
 def _name_lines(axes: Axes, lines: Lines, styles: dict[str, tuple[str, str]]) -> None:
-    """Each line's name to the right of its end, moved up or down where two would touch."""
+    """Each line's name to the right of its end, or of its only point; those at the margin move apart."""
     low, high = (math.log10(end) for end in axes.get_ylim())
-    ends = {name: (math.log10(line[-1].cost or 1.0) - low) / (high - low) for name, line in lines.items()}
-    heights: dict[str, float] = {}
-    for name in sorted(ends, key=lambda name: ends[name]):
-        below = max(heights.values(), default=-1.0)
-        heights[name] = max(ends[name], below + _GAP)
-    for name, height in heights.items():
-        axes.annotate(
-            name, (1.02, height), xycoords="axes fraction", va="center", color=styles[name][0],
-            fontweight="bold" if name == OURS else "normal", annotation_clip=False,
-        )  # fmt: skip
+    last = max(line[-1].size for line in lines.values())
+    ends = {}
+    for name, line in lines.items():
+        style = {"color": styles[name][0], "fontweight": "bold" if name == OURS else "normal", "va": "center"}
+        if line[-1].size == last:
+            ends[name] = (math.log10(line[-1].cost or 1.0) - low) / (high - low), style
+        else:
+            at = (line[-1].size, line[-1].cost)
+            axes.annotate(name, at, (6, 0), textcoords="offset points", **style)
+    heights = _apart([height for height, _ in ends.values()])
+    for (name, (_, style)), height in zip(ends.items(), heights, strict=True):
+        axes.annotate(name, (1.02, height), xycoords="axes fraction", annotation_clip=False, **style)
+
+
+def _apart(heights: list[float]) -> list[float]:
+    """Heights at least a gap apart, in the same order, each group around where it was."""
+    order = sorted(range(len(heights)), key=lambda index: heights[index])
+    groups: list[list[int]] = []
+    centre = {}
+    for index in order:
+        groups.append([index])
+        centre[index] = heights[index]
+        while len(groups) > 1:
+            below, above = groups[-2], groups[-1]
+            room = (len(below) + len(above)) * _GAP / 2
+            if centre[above[0]] - centre[below[0]] >= room - 1e-12:
+                break
+            merged = below + above
+            centre[merged[0]] = sum(heights[one] for one in merged) / len(merged)
+            groups[-2:] = [merged]
+    moved = list(heights)
+    for group in groups:
+        for place, index in enumerate(group):
+            moved[index] = centre[group[0]] + (place - (len(group) - 1) / 2) * _GAP
+    return moved

@@ -10,7 +10,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 
 from benchmarks.growth import draw
-from benchmarks.result import OURS, Result
+from benchmarks.result import OURS, Result, duration
 
 _HEADINGS = ("benchmark", "size", "contender", "time", "per", "speed of tickwise")
 
@@ -27,24 +27,25 @@ def table(results: list[Result]) -> str:
 
 
 def _row(one: Result, ours: float | None) -> tuple[str, ...]:
-    size = "" if one.axis == "none" else f"{one.size}×{one.size}" if one.axis == "world" else f"{one.size:,} {one.axis}"
+    size = sized(one)
     if one.cost is None:
         return one.benchmark, size, one.contender, "skipped", one.unit, one.skipped
     ratio = "" if ours is None or one.contender == OURS else times(one.cost / ours)
     return one.benchmark, size, one.contender, duration(one.cost), one.unit, ratio
 
 
+def sized(one: Result) -> str:
+    """The size for people: 9×9, 1,000 ticks, 1 run."""
+    if one.axis == "none":
+        return ""
+    if one.axis == "world":
+        return f"{one.size}×{one.size}"
+    return f"{one.size:,} {one.axis}" if one.size != 1 else f"1 {one.axis.removesuffix('s')}"
+
+
 def times(ratio: float) -> str:
     """A ratio for people: 0.97×, 12×, 1,400×."""
     return f"{ratio:.2f}×" if ratio < 10 else f"{float(f'{ratio:.2g}'):,.0f}×"
-
-
-def duration(seconds: float) -> str:
-    """A time for people, with three digits."""
-    for unit, length in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
-        if seconds >= length:
-            return f"{seconds / length:.3g} {unit}"
-    return f"{seconds / 1e-9:.3g} ns"
 
 
 def write(results: list[Result], folder: Path, quick: bool) -> None:

@@ -45,3 +45,11 @@ class Result:
     def cost(self) -> float | None:
         """Seconds a unit of work; None if it did not run."""
         return None if self.seconds is None else self.seconds / self.work
+
+
+def duration(seconds: float) -> str:
+    """A time for people, with three digits."""
+    for unit, length in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= length:
+            return f"{seconds / length:.3g} {unit}"
+    return f"{seconds / 1e-9:.3g} ns"
