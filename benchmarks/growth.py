@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.result import OURS, Result, duration
 
@@ -38,7 +38,7 @@ def draw(results: list[Result], path: Path, columns: int = 3) -> None:
     panels = _panels(results)
     if not panels:
         return
-    styles = _styles(results)
+    styles = _styles(panels)
     rows = math.ceil(len(panels) / columns)
     with mpl.rc_context({"svg.fonttype": "none", "svg.hashsalt": "growth", "font.size": 9}):
         figure = Figure(figsize=(4.6 * columns, 3.3 * rows), layout="constrained")
@@ -63,9 +63,14 @@ def _panels(results: list[Result]) -> dict[tuple[str, str], Lines]:
     return {key: lines for key, lines in panels.items() if max(map(len, lines.values())) > 1}
 
 
-def _styles(results: list[Result]) -> dict[str, tuple[str, str]]:
-    others = [name for name in dict.fromkeys(one.contender for one in results) if name not in _STYLES]
-    return _STYLES | {name: _OTHERS[index % len(_OTHERS)] for index, name in enumerate(others)}
+def _styles(panels: dict[tuple[str, str], Lines]) -> dict[str, tuple[str, str]]:
+    """A style for each contender, the same in all panels and another than those it shares a panel with."""
+    styles = dict(_STYLES)
+    for name in dict.fromkeys(name for lines in panels.values() for name in lines):
+        beside = {styles.get(other) for lines in panels.values() if name in lines for other in lines}
+        free = [style for style in _OTHERS if style not in beside]
+        styles.setdefault(name, (free or _OTHERS)[0])
+    return styles
 
 
 def _panel(axes: Axes, benchmark: str, axis: str, lines: Lines, styles: dict[str, tuple[str, str]]) -> None:
@@ -106,6 +111,8 @@ def _widen(axes: Axes) -> None:
         middle = math.sqrt(low * high)
         low, high = middle / math.sqrt(10), middle * math.sqrt(10)
     axes.set_ylim(low, high)
+    if high / low < 100:
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
 
 
 def _name_lines(axes: Axes, lines: Lines, styles: dict[str, tuple[str, str]]) -> None:
@@ -117,12 +124,17 @@ def _name_lines(axes: Axes, lines: Lines, styles: dict[str, tuple[str, str]]) ->
         style = {"color": styles[name][0], "fontweight": "bold" if name == OURS else "normal", "va": "center"}
         if line[-1].size == last:
             ends[name] = (math.log10(line[-1].cost or 1.0) - low) / (high - low), style
+        elif len(line) == 1:
+            _name_point(axes, name, line[-1], (6, 0), style)
         else:
-            at = (line[-1].size, line[-1].cost)
-            axes.annotate(name, at, (6, 0), textcoords="offset points", **style)
+            _name_point(axes, name, line[-1], (0, 6), style | {"va": "bottom", "ha": "center"})
     heights = _apart([height for height, _ in ends.values()])
     for (name, (_, style)), height in zip(ends.items(), heights, strict=True):
         axes.annotate(name, (1.02, height), xycoords="axes fraction", annotation_clip=False, **style)
+
+
+def _name_point(axes: Axes, name: str, one: Result, offset: tuple[int, int], style: dict[str, str]) -> None:
+    axes.annotate(name, (one.size, one.cost or 1.0), offset, textcoords="offset points", **style)
 
 
 def _apart(heights: list[float]) -> list[float]:
