@@ -28,8 +28,10 @@ lint: $(VENV)/.development ## check style and layout
 types: $(VENV)/.development ## check the types
 	$(BIN)/mypy
 
-bench: $(VENV)/.runtime ## compare the learning loop with C
-	$(BIN)/python benchmarks/learning.py
+# One core each, and an environment of its own: what the others need is nothing that tickwise needs.
+bench: build/bench/.peers ## compare with C and with other libraries, in time and in growth; QUICK=1 for a short run
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 \
+	  build/bench/bin/python -m benchmarks $(if $(QUICK),--quick --out runs/bench-quick) $(ONLY)
 
 kills: $(VENV)/.runtime ## kill a reproduction a hundred times, and compare with one left alone
 	$(BIN)/python benchmarks/kills.py
@@ -51,6 +53,15 @@ $(VENV)/.runtime: $(VENV)/.created requirements.lock pyproject.toml
 
 $(VENV)/.development: $(VENV)/.runtime requirements-dev.lock
 	$(PIP) install --requirement requirements-dev.lock
+	@touch $@
+
+# One that does not install is told of and left out; the benchmarks then say that it was skipped.
+build/bench/.peers: requirements.lock benchmarks/requirements.txt pyproject.toml
+	$(MAKE) --no-print-directory VENV=build/bench build/bench/.runtime
+	@grep '==' benchmarks/requirements.txt | while read -r peer; do \
+	  build/bench/bin/python -m pip --disable-pip-version-check --no-input --quiet install --no-deps "$$peer" \
+	    || echo "$$peer does not install here: left out" >&2; \
+	done
 	@touch $@
 
 # rtamt has no release for Python 3.13: run this with 3.11 or 3.12

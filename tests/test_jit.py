@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +28,13 @@ os.access = lambda path, mode, **named: not mode & os.W_OK and real_access(path,
 """
 
 
-def run(code: str, cwd: Path, **environment: str) -> str:
+def run(code: str, cwd: Path, before: Callable[[], None] | None = None, **environment: str) -> str:
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
     done = subprocess.run(
         [sys.executable, "-W", "error", "-B", "-c", code],
         cwd=cwd,
         env=kept | environment,
+        preexec_fn=before,
         capture_output=True,
         text=True,
         check=False,
@@ -76,6 +79,46 @@ def test_without_a_place_for_the_cache_it_goes_to_the_temporary_folder(copy: Pat
     assert not list((copy / "site").rglob("*.nbi"))
     # and again, now that the folder is there
     assert run(NOTHING_WRITABLE + USE, copy, **environment).splitlines()[1] == "1"
+
+
+def obey_the_rights_of_files() -> None:
+    """Give up root's right to write everywhere, for this process and what it becomes (PR_CAPBSET_DROP, Linux)."""
+    override_rights, drop = 1, 24
+    if os.geteuid() == 0 and ctypes.CDLL(None, use_errno=True).prctl(drop, override_rights, 0, 0, 0):
+        raise OSError(ctypes.get_errno(), "root keeps its rights")
+
+
+REFUSED = """
+from pathlib import Path
+import tickwise
+for folder in (Path(tickwise.__file__).parent, Path.home()):
+    try:
+        (folder / "new").touch()
+    except PermissionError:
+        continue
+    print("writable:", folder)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="how root gives up its rights is Linux's")
+def test_where_neither_package_nor_home_can_be_written(copy: Path):
+    """Without any pretence: the rights of the folders say so, and root obeys them."""
+    site, home, temporary = copy / "site", copy / "home", copy / "tmp"
+    home.mkdir()
+    for folder in (site, home):
+        folder.chmod(0o555)
+    environment = {"PYTHONPATH": str(site), "HOME": str(home), "XDG_CACHE_HOME": str(home), "TMPDIR": str(temporary)}
+    try:
+        assert run(REFUSED, copy, obey_the_rights_of_files, **environment) == ""
+    except subprocess.SubprocessError:
+        pytest.skip("root may not give up its rights here")
+    for _ in range(2):  # the second finds what the first cached
+        module, drawn, cache = run(USE, copy, obey_the_rights_of_files, **environment).splitlines()
+        assert Path(module).parent == site / "tickwise"
+        assert drawn == "1"
+        assert Path(cache).parent == temporary
+    assert list(Path(cache).rglob("*draw_state*.nbi")), "nothing was cached"
+    assert not [*site.rglob("__pycache__"), *home.iterdir()]
 
 
 def test_a_chosen_folder_is_left_alone(copy: Path):

@@ -13,6 +13,7 @@ from tickwise.envs.tasks import TaskTable
 from tickwise.rl.kernels import draw_state, greedy_returns
 from tickwise.rl.qlearning import Problem, QSettings, collect, learn
 from tickwise.rl.states import Memory
+from tickwise.rl.stream import take_stream
 
 EPISODES = 12
 
@@ -47,7 +48,7 @@ def test_greedy_play_equals_its_twin(problem: Problem, seed: int, ties: bool):
     values = rng.integers(0, 2, size=shape) if ties else rng.normal(size=shape)
     q = values.astype(np.float32)
     returns = np.empty(EPISODES, dtype=np.float32)
-    greedy_returns(*problem.arrays, np.random.default_rng(seed), q, returns)
+    greedy_returns(*problem.arrays, take_stream(np.random.default_rng(seed)), q, returns)
     expected = slow_greedy_returns(problem, q, np.random.default_rng(seed), EPISODES)
     assert returns.tobytes() == expected.tobytes()
 

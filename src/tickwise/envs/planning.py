@@ -9,6 +9,9 @@ from tickwise._jit import njit
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.envs.tasks import TaskTable
 
+# Unsigned, so that the compiled indexing need not ask whether an index counts from the end.
+_index = np.uint32
+
 
 def optimal_value(mdp: TabularMDP, task: TaskTable) -> float:
     """The optimal value V*: the greatest expected undiscounted return, averaged over the initial states.
@@ -142,8 +145,9 @@ def backward_induction(
                 for a in range(actions):
                     expected = 0.0
                     for k in range(outcomes):
-                        after = successor[s, a, k]
-                        expected += probability[s, a, k] * arriving[task_delta[w, task_letter[after]], after]
+                        after = _index(successor[s, a, k])
+                        then = _index(task_delta[w, _index(task_letter[after])])
+                        expected += probability[s, a, k] * arriving[then, after]
                     best = max(best, sign * expected)
                 values[w, s] = sign * best
     return values

@@ -14,6 +14,8 @@ from tickwise.inference.kernels import EVENTUALLY, EVENTUALLY_ALWAYS, PriorArray
 from tickwise.inference.numbering import place, roomier
 
 _ADVANCE, _FAIL = -1, -2
+# Unsigned, so that the compiled indexing need not ask whether an index counts from the end.
+_index = np.uint64
 
 
 @njit
@@ -294,24 +296,25 @@ def _read(
     accepted, largest = 0.0, 0.0
     spans[:, 0], spans[:, 1] = len(mass), 0
     single = len(reads) == 1
-    for state in range(bounds[0], bounds[1]):
+    for state in range(_index(bounds[0]), _index(bounds[1])):
         weight = mass[state]
         if weight == 0.0:
             continue
         mass[state] = 0.0
-        bits = 0
+        bits = _index(0)
         if single:
-            bits = int(letters[reads[0], state])
+            bits = _index(letters[_index(reads[0]), state])
         else:
             for i in range(len(reads)):
-                if reads[i] >= 0 and letters[reads[i], state]:
-                    bits |= 1 << i
+                if reads[i] >= 0 and letters[_index(reads[i]), state]:
+                    bits |= _index(1) << _index(i)
         slot = outcomes[bits]
         if slot >= 0:
-            moved[slot, state] += weight
-            spans[bits, 0] = min(spans[bits, 0], state)
-            spans[bits, 1] = state + 1
-            largest = max(largest, weight)
+            moved[_index(slot), state] += weight
+            spans[bits, 0] = min(spans[bits, 0], np.int64(state))
+            spans[bits, 1] = state + _index(1)
+            if weight > largest:
+                largest = weight
         elif slot == _ADVANCE:
             accepted += weight * later[state]
     return accepted, largest
@@ -356,15 +359,15 @@ def _step(
     for k in range(used):
         source, target = moved[k], mass[k]
         low, high = len(source), 0
-        for state in range(moved_range[k, 0], moved_range[k, 1]):
+        for state in range(_index(moved_range[k, 0]), _index(moved_range[k, 1])):
             weight = source[state] * share
             if weight != 0.0:
                 source[state] = 0.0
-                begin, end = indptr[state], indptr[state + 1]
+                begin, end = _index(indptr[state]), _index(indptr[state + _index(1)])
                 for edge in range(begin, end):
-                    target[indices[edge]] += weight * weights[edge]
+                    target[_index(indices[edge])] += weight * weights[edge]
                 if begin < end:  # successors are sorted
-                    low, high = min(low, indices[begin]), max(high, indices[end - 1] + 1)
+                    low, high = min(low, indices[begin]), max(high, indices[end - _index(1)] + 1)
         mass_range[k, 0], mass_range[k, 1] = low, high
 
 

@@ -12,18 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise._jit import njit
+from tickwise.rl.stream import uniform
 
 # Unsigned, so that the compiled indexing need not ask whether an index counts from the end.
 _index = np.uint32
 
 
 @njit
-def draw_state(thresholds: NDArray[np.float64], uniform: float) -> int:
+def draw_state(thresholds: NDArray[np.float64], number: float) -> int:
     """The initial state that a uniform number selects: the first whose threshold exceeds it."""
     low, high = 0, len(thresholds) - 1
     while low < high:
         middle = (low + high) // 2
-        if thresholds[middle] > uniform:
+        if thresholds[middle] > number:
             high = middle
         else:
             low = middle + 1
@@ -48,7 +49,7 @@ def q_learning(
     alpha: float,
     gamma: float,
     epsilon: float,
-    rng: np.random.Generator,
+    stream: NDArray[np.uint64],
     q: NDArray[np.float32],
     returns: NDArray[np.float32],
     paths: NDArray[np.int32],
@@ -58,13 +59,14 @@ def q_learning(
     ``q`` has shape ``(memory states, states, actions)``. ``returns``, shape ``(episodes,)``, is filled with
     the undiscounted return of each episode. ``paths``, shape ``(episodes, horizon + 1)``, is filled with the
     MDP states of each episode and -1 after its end; shape ``(0, 0)`` records nothing. The rest is the
-    problem's arrays, the settings and the generator; see `tickwise.rl.qlearning`.
+    problem's arrays, the settings and the generator's stream; see `tickwise.rl.qlearning` and
+    `tickwise.rl.stream`.
     """
     actions = successor.shape[1]
     outcomes = successor.shape[2]
     record = len(paths) > 0
     for episode in range(len(returns)):
-        s = _index(draw_state(start_thresholds, rng.random()))
+        s = _index(draw_state(start_thresholds, uniform(stream)))
         w = _index(task_start[s])
         u = _index(memory_start[s])
         total = 0.0
@@ -75,23 +77,25 @@ def q_learning(
         for a in range(1, actions):
             best = max(best, q[u, s, a])
         for t in range(1, horizon + 1):
-            # both draws at once: a call makes the registers' contents go to memory and back
-            uniform = rng.random()
-            chance = rng.random()
-            if uniform < epsilon:
-                action = _index(uniform / epsilon * actions)
+            number = uniform(stream)
+            if number < epsilon:
+                action = _index(number / epsilon * actions)
             else:
                 ties = 0
-                for a in range(actions):
-                    ties += q[u, s, a] == best
-                pick = int((uniform - epsilon) / (1.0 - epsilon) * ties)
                 action = _index(0)
                 for a in range(actions):
                     if q[u, s, a] == best:
-                        if pick == 0:
-                            action = _index(a)
-                            break
-                        pick -= 1
+                        action = _index(a)
+                        ties += 1
+                if ties > 1:
+                    pick = int((number - epsilon) / (1.0 - epsilon) * ties)
+                    for a in range(actions):
+                        if q[u, s, a] == best:
+                            if pick == 0:
+                                action = _index(a)
+                                break
+                            pick -= 1
+            chance = uniform(stream)
             outcome = _index(0)
             while outcome < outcomes - 1 and chance >= thresholds[s, action, outcome]:
                 outcome = _index(outcome + 1)
@@ -138,7 +142,7 @@ def greedy_returns(
     memory_start: NDArray[np.int32],
     memory_delta: NDArray[np.int32],
     memory_letter: NDArray[np.int32],
-    rng: np.random.Generator,
+    stream: NDArray[np.uint64],
     q: NDArray[np.float32],
     returns: NDArray[np.float32],
 ) -> None:
@@ -146,17 +150,16 @@ def greedy_returns(
     actions = successor.shape[1]
     outcomes = successor.shape[2]
     for episode in range(len(returns)):
-        s = _index(draw_state(start_thresholds, rng.random()))
+        s = _index(draw_state(start_thresholds, uniform(stream)))
         w = _index(task_start[s])
         u = _index(memory_start[s])
         total = 0.0
         for t in range(1, horizon + 1):
-            chance = rng.random()
+            chance = uniform(stream)
             action = _index(0)
-            best = q[u, s, 0]
             for a in range(1, actions):
-                if q[u, s, a] > best:
-                    best = q[u, s, a]
+                # not against a running maximum: that becomes a chain of selections, where this is a jump well foreseen
+                if q[u, s, a] > q[u, s, action]:
                     action = _index(a)
             outcome = _index(0)
             while outcome < outcomes - 1 and chance >= thresholds[s, action, outcome]:

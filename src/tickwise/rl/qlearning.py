@@ -14,6 +14,7 @@ from tickwise.envs.tasks import TaskTable
 from tickwise.errors import ConfigurationError
 from tickwise.rl.kernels import greedy_returns, q_learning
 from tickwise.rl.states import Memory
+from tickwise.rl.stream import put_back, take_stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,8 +121,10 @@ def _play(
 ) -> None:
     # floats, since whole numbers would have the loop compiled once more
     rates = float(settings.alpha), float(settings.gamma), float(settings.epsilon)
-    arguments: tuple[Any, ...] = (*problem.arrays, *rates, rng, q, returns, paths)
+    stream = take_stream(rng)
+    arguments: tuple[Any, ...] = (*problem.arrays, *rates, stream, q, returns, paths)
     q_learning(*arguments)
+    put_back(rng, stream)
 
 
 def evaluate(problem: Problem, q: NDArray[np.float32], seed: np.random.SeedSequence, episodes: int) -> float:
@@ -137,6 +140,6 @@ def evaluate(problem: Problem, q: NDArray[np.float32], seed: np.random.SeedSeque
         The mean return, in units of reward.
     """
     returns = np.empty(episodes, dtype=np.float32)
-    arguments: tuple[Any, ...] = (*problem.arrays, np.random.default_rng(seed), q, returns)
+    arguments: tuple[Any, ...] = (*problem.arrays, take_stream(np.random.default_rng(seed)), q, returns)
     greedy_returns(*arguments)
     return float(returns.mean(dtype=np.float64))

@@ -1,0 +1,1 @@
+"""What Tickwise costs, beside C and other libraries on the same work; ``make bench`` runs all of it."""
