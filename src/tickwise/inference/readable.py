@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -21,8 +21,8 @@ def readable(formula: SDNF, data: LabelledTrajectories, space: SearchSpace) -> S
     """The formula with the shortest decimals as sides of its boxes, where they may be any number.
 
     One side after the other is put where no trajectory changes its verdict on the primitive: between the two values of
-    the data next to which one would. Of the shortest decimals there, the one nearest to the middle leaves other
-    trajectories the most room.
+    the data next to which one would, or the end of the space. Of the shortest decimals there, the one nearest to the
+    middle leaves other trajectories the most room.
 
     Args:
         formula: A formula.
@@ -32,18 +32,19 @@ def readable(formula: SDNF, data: LabelledTrajectories, space: SearchSpace) -> S
     Returns:
         The formula, with the same verdict of every primitive on every trajectory.
     """
-    names = [name for name, continuous in zip(space.variables, space.continuous, strict=True) if continuous]
+    ends = zip(space.variables, space.edges, space.continuous, strict=True)
+    ranges = {name: (edges[0], edges[-1]) for name, edges, continuous in ends if continuous}
     rows = [
-        SequentialConjunction(tuple(_readable(primitive, data, names) for primitive in disjunct.primitives))
+        SequentialConjunction(tuple(_readable(primitive, data, ranges) for primitive in disjunct.primitives))
         for disjunct in formula.disjuncts
     ]
     return SDNF(tuple(rows))
 
 
-def _readable(primitive: Primitive, data: LabelledTrajectories, names: list[str]) -> Primitive:
+def _readable(primitive: Primitive, data: LabelledTrajectories, ranges: Mapping[str, tuple[float, float]]) -> Primitive:
     verdicts = _verdicts(primitive, data)
     for bound in primitive.box.bounds:
-        if bound.variable not in names:
+        if bound.variable not in ranges:
             continue
         states = data.values[..., data.variables.index(bound.variable)]
         values = np.unique(states[~np.isnan(states)])
@@ -54,7 +55,8 @@ def _readable(primitive: Primitive, data: LabelledTrajectories, names: list[str]
             inner, outer = _room(primitive, data, verdicts, (bound.variable, side), values, number)
             low, high = (inner, outer) if outward > 0 else (outer, inner)
             other = _side(primitive, bound.variable, "lower" if outward > 0 else "upper")
-            low, high = (max(low, other), high) if outward > 0 else (low, min(high, other))
+            first, last = ranges[bound.variable]
+            low, high = (max(low, other), min(high, last)) if outward > 0 else (max(low, first), min(high, other))
             if low < high:
                 primitive = _with_side(primitive, bound.variable, side, shortest_between(low, high))
     return primitive

@@ -247,8 +247,8 @@ class _Grower:
                 self.grow(subset, weights[mask], below, depth + 1, rng.spawn(1)[0], interrupted=best.interrupted)
             )
         return DecisionTree(
-            path, depth, positives, negatives, None, None, primitive, best.objective, best.rate, best.gain, *children,
-            gap=best.gap,
+            path, depth, positives, negatives, None, None, primitive, best.objective, best.rate, best.gain,
+            left=children[0], right=children[1], gap=best.gap,
         )  # fmt: skip
 
     def _stop(self, share: float, depth: int, gaps: Gaps) -> str | None:
