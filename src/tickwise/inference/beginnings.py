@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from tickwise.inference.draft import Draft, Drafter, Structure, filled
+from tickwise.inference.exact import TIE
 
 COARSE = 12
 """Levels of continuous variables while beginnings are looked for."""
@@ -41,14 +42,14 @@ def emphasis(drafter: Drafter) -> float:
     return float(_KEEP * max(drafter.weights[~good].sum() / drafter.weights[good].sum(), 1.0))
 
 
-def climb(drafter: Drafter, begun: Iterable[tuple[Draft, Structure]], enough: float = math.inf) -> list[Scored]:
-    """Ascend from the best beginnings, up to one with a rate that is enough; the best formula first."""
+def climb(drafter: Drafter, begun: Iterable[tuple[Draft, Structure]]) -> list[Scored]:
+    """Ascend from the best beginnings, up to one that makes no error; the best formula first."""
     ranked = sorted(dict.fromkeys(begun), key=lambda pair: -drafter.value(pair[0]))
     peaks: dict[Draft, float] = {}
     for draft, structure in ranked[:_CLIMBED]:
         peak, value = drafter.ascend(draft, structure)
         peaks.setdefault(peak, value)
-        if drafter.rate(peak) >= enough:
+        if drafter.rate(peak) >= 1.0 - TIE:
             break
     return sorted(((value, draft) for draft, value in peaks.items()), key=lambda pair: -pair[0])
 

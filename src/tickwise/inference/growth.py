@@ -97,7 +97,7 @@ def _grown(drafter: Drafter, rough: Drafter, seed: Draft, size: int, rate: float
     beam, best = [seed], [seed]
     while len(best) < size and drafter.rate(best[-1]) < rate and not drafter.interrupted:
         bar = Bar.of(rough)
-        climbed = climb(drafter, (pair for draft in beam for pair in _extended(rough, draft, bar)), rate)
+        climbed = climb(drafter, (pair for draft in beam for pair in _extended(rough, draft, bar)))
         if not climbed:
             break
         beam = [draft for _, draft in climbed[:_BEAM]]
