@@ -17,7 +17,8 @@ from tickwise.inference.gains import gain_bound
 from tickwise.inference.kernels import Shape, satisfied
 from tickwise.inference.levels import Levels, code
 from tickwise.inference.prior import BoxPrior
-from tickwise.inference.scan import Worth, bound, bound_all, candidates, signature, tabulate, weigh
+from tickwise.inference.scan import Worth, bound, bound_all, candidates, tabulate
+from tickwise.inference.signals import signature, weigh
 from tickwise.inference.space import OPERATORS
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.sdnf import Operator
@@ -91,7 +92,7 @@ def check_table(data, weights, node, first, last, horizon):
     assert table.shape == (ticks,) * 3
     for choice in every_window(node, ((first, last),)):
         start, end, duration = choice.times
-        assert table[start - first, end - first, duration] == right(data, weights, choice)[1], choice
+        assert table[duration, start - first, end - first] == right(data, weights, choice)[1], choice
 
 
 @settings(max_examples=150)

@@ -41,7 +41,8 @@ from tickwise.inference.gains import gain_bound
 from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
 from tickwise.inference.levels import Coded, Levels
 from tickwise.inference.prior import Prior
-from tickwise.inference.scan import Worth, candidates, weigh
+from tickwise.inference.scan import Worth, candidates
+from tickwise.inference.signals import weigh
 from tickwise.inference.slot import Slot
 from tickwise.inference.space import OPERATORS, Gaps, to_formula
 from tickwise.inference.support import lasting

@@ -19,9 +19,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise._jit import njit, trailing_zeros
+from tickwise._jit import njit
 from tickwise.inference.gains import COMPLEMENTED, EXISTENTIAL, SIDES, GainBound, gain_bounds
-from tickwise.inference.levels import WORD, Coded
+from tickwise.inference.levels import Coded
+from tickwise.inference.signals import next_tick, signal
 
 OUTER, INNER = 0, 1
 
@@ -47,54 +48,6 @@ class Worth(NamedTuple):
 
 
 @njit
-def _next(row: NDArray[np.uint64], tick: int, flip: np.uint64) -> int:
-    """The first tick from ``tick`` on whose bit is set (or clear, where all bits are flipped); the end if none is."""
-    word = tick // WORD
-    bits = (row[word] ^ flip) >> np.uint64(tick % WORD)
-    if bits != 0:
-        return tick + int(trailing_zeros(bits))
-    for later in range(word + 1, len(row)):
-        bits = row[later] ^ flip
-        if bits != 0:
-            return later * WORD + int(trailing_zeros(bits))
-    return len(row) * WORD
-
-
-@njit
-def _signal(
-    coded: Coded, i: int, existential: bool, complemented: bool, sides: NDArray[np.int64], row: NDArray[np.uint64]
-) -> None:
-    """The ticks of a trajectory at which a predicate holds, or for □ and □◇ is violated.
-
-    What comes after its last tick is UNKNOWN: there ◇ may still be satisfied, and □ is not violated (the weak view).
-
-    Args:
-        coded: The trajectories.
-        i: Which one.
-        existential: Whether the operator is ◇ or ◇□.
-        complemented: Whether the predicate is the complement of the box.
-        sides: The level of each lower side, then of each upper side, shape ``(2 * variables,)``.
-        row: Filled with the bits, shape ``(words,)``.
-    """
-    width = len(sides) // 2
-    empty = False
-    for variable in range(width):
-        empty = empty or sides[variable] >= sides[width + variable]
-    for word in range(len(row)):
-        bits = np.uint64(0)
-        if not empty:
-            bits = coded.alive[i, word]
-            for variable in range(width):
-                bits &= coded.at_least[variable, sides[variable], i, word]
-                bits &= coded.at_most[variable, sides[width + variable], i, word]
-        if existential == complemented:
-            bits = ~bits if existential else coded.alive[i, word] & ~bits
-        elif existential:
-            bits |= ~coded.alive[i, word]
-        row[word] = bits
-
-
-@njit
 def _corner(node: NDArray[np.int64], corner: int, sides: NDArray[np.int64]) -> None:
     """The outermost or the innermost box of a node."""
     width = (len(node) - SIDES) // 4
@@ -117,30 +70,50 @@ def tabulate(
         table: Working space, shape ``(ticks, ticks, ticks)`` with ``ticks >= last - first + 1``.
 
     Returns:
-        A view of the table: the weight for a window from ``first + a`` to ``first + b`` and a duration of c ticks
-        at ``[a, b, c]``, for ``a < b`` and ``b + c <= last - first``.
+        A view of the table: the weight for a duration of c ticks and a window from ``first + a`` to ``first + b`` at
+        ``[c, a, b]``, for ``a < b`` and ``b + c <= last - first``.
     """
     ticks = last - first + 1
     view = table[:ticks, :ticks, :ticks]
-    view[:] = 0.0
-    never = np.zeros(ticks + 1)  # weight of the trajectories whose longest run has so many ticks
+    for duration in range(ticks):
+        for tick in range(duration, ticks):
+            for end in range(tick, ticks):
+                view[duration, tick, end] = 0.0
+    gaps = _Gaps(view, np.zeros((ticks + 1, ticks)), np.zeros((ticks + 1, ticks)), np.zeros(ticks + 1))
     row = np.empty(coded.alive.shape[1], dtype=np.uint64)
-    begins, ends = np.empty(ticks // 2 + 1, dtype=np.int64), np.empty(ticks // 2 + 1, dtype=np.int64)
-    outer, inner = np.empty((len(node) - SIDES) // 2, np.int64), np.empty((len(node) - SIDES) // 2, np.int64)
-    _corner(node, OUTER, outer)
-    _corner(node, INNER, inner)
+    ends, lengths = np.empty(ticks // 2 + 1, dtype=np.int64), np.empty(ticks // 2 + 1, dtype=np.int64)
+    corners = np.empty((2, (len(node) - SIDES) // 2), dtype=np.int64)
+    _corner(node, OUTER, corners[0])
+    _corner(node, INNER, corners[1])
     existential, complemented = node[EXISTENTIAL] == 1, node[COMPLEMENTED] == 1
-    # a violation is rightly called, and so is a satisfaction: `sign` turns the one count into the other
-    right, sign = 0.0, -1.0 if existential else 1.0
+    # a violation is rightly called, and so is a satisfaction: the sign turns the one count into the other
+    right = 0.0
     for i in range(len(coded.positive)):
-        positive = coded.positive[i]
-        weight = coded.weights[i] if positive else -coded.weights[i]
-        if positive == existential:
-            right += coded.weights[i]
-        _signal(coded, i, existential, complemented, outer if positive != complemented else inner, row)
-        _add_gaps(row, first, last, sign * weight, begins, ends, view, never)
-    _sum_up(view, right, never)
+        positive, weight = coded.positive[i], coded.weights[i]
+        right += weight * (positive == existential)
+        signal(coded, i, existential, complemented, corners[int(positive == complemented)], row)
+        _add_gaps(row, first, last, weight * (1.0 - 2.0 * (positive == existential)), gaps, ends, lengths)
+    _sum_up(gaps, right)
     return view
+
+
+class _Gaps(NamedTuple):
+    """Weights of maximal windows in which no run of c + 1 ticks begins, as steps over the duration c.
+
+    Such a window ends before a run that is long enough and begins where too little is left of the one before. The last
+    tick of the latter thus says where, for all c at once.
+
+    Attributes:
+        between: Of windows between two runs, at ``[c, tick after the first run, last tick before the second]``.
+        before: Of windows before the first such run, at ``[c, last tick]``.
+        after: Of windows after the last such run, at ``[c, tick after the run]``.
+        never: Of all windows, where no run is longer than c ticks, at ``[c]``.
+    """
+
+    between: NDArray[np.float64]
+    before: NDArray[np.float64]
+    after: NDArray[np.float64]
+    never: NDArray[np.float64]
 
 
 @njit
@@ -149,55 +122,66 @@ def _add_gaps(
     first: int,
     last: int,
     weight: float,
-    begins: NDArray[np.int64],
+    gaps: _Gaps,
     ends: NDArray[np.int64],
-    view: NDArray[np.float64],
-    never: NDArray[np.float64],
+    lengths: NDArray[np.int64],
 ) -> None:
-    """Add a trajectory's weight at its maximal windows in which no run of c + 1 ticks begins, for every c."""
-    runs, longest, tick = 0, 0, first
+    """Add a trajectory's weight; ``ends`` and ``lengths`` are room for a stack of runs, the longest at the bottom."""
+    top, tick = 0, first
     while tick <= last:
-        tick = _next(row, tick, np.uint64(0))
+        tick = next_tick(row, tick, np.uint64(0))
         if tick > last:
             break
-        end = min(_next(row, tick, ~np.uint64(0)) - 1, last)
-        begins[runs], ends[runs] = tick - first, end - first
-        longest = max(longest, end - tick + 1)
-        runs += 1
+        end = min(next_tick(row, tick, ~np.uint64(0)) - 1, last)
+        begin, length, hidden = tick - first, end - tick + 1, 0
+        while top > 0:  # the runs that this one sees over those between, which are at most `hidden` long
+            shorter = min(lengths[top - 1], length)
+            if shorter > hidden:
+                gaps.between[hidden, ends[top - 1] + 1, begin - 1] += weight
+                gaps.between[shorter, ends[top - 1] + 1, begin - 1] -= weight
+            if lengths[top - 1] > length:
+                break
+            hidden = lengths[top - 1]
+            top -= 1
+        if top == 0 and length > hidden and begin > 0:
+            gaps.before[hidden, begin - 1] += weight
+            gaps.before[length, begin - 1] -= weight
+        ends[top], lengths[top] = end - first, length
+        top += 1
         tick = end + 2
-    for duration in range(longest):
-        start, kept = 0, 0
-        for run in range(runs):
-            if ends[run] - begins[run] >= duration:
-                if begins[run] - 1 > start:
-                    view[start, begins[run] - 1, duration] += weight
-                start = ends[run] - duration + 1
-                begins[kept], ends[kept] = begins[run], ends[run]
-                kept += 1
-        runs = kept
-        end = last - first - duration
-        if end > start:
-            view[start, end, duration] += weight
-    never[longest] += weight
+    gaps.never[lengths[0] if top > 0 else 0] += weight
+    hidden = 0
+    while top > 0:
+        top -= 1
+        if lengths[top] > hidden and ends[top] < last - first:
+            gaps.after[hidden, ends[top] + 1] += weight
+            gaps.after[lengths[top], ends[top] + 1] -= weight
+        hidden = lengths[top]
 
 
 @njit
-def _sum_up(view: NDArray[np.float64], right: float, never: NDArray[np.float64]) -> None:
-    """Turn weights at maximal windows into sums over all windows that they contain."""
+def _sum_up(gaps: _Gaps, right: float) -> None:
+    """Turn weights of maximal windows into sums over all windows that they contain, in the place of ``between``."""
+    view = gaps.between
     ticks = len(view)
-    for a in range(ticks):
-        for b in range(ticks - 2, a, -1):
-            for duration in range(ticks - b - 1):
-                view[a, b, duration] += view[a, b + 1, duration]
-    for a in range(1, ticks):
-        for b in range(a + 1, ticks):
-            for duration in range(ticks - b):
-                view[a, b, duration] += view[a - 1, b, duration]
-    for duration in range(ticks):
-        right += never[duration]
-        for a in range(ticks - duration):
-            for b in range(a + 1, ticks - duration):
-                view[a, b, duration] += right
+    between, before, after = np.zeros((ticks, ticks)), np.zeros(ticks), np.zeros(ticks)
+    for duration in range(ticks - 1):
+        right += gaps.never[duration]
+        before += gaps.before[duration]
+        after += gaps.after[duration]
+        for tick in range(duration, ticks):
+            for b in range(tick, ticks):
+                between[tick, b] += view[duration, tick, b]
+        ended, size = before.copy(), ticks - duration
+        reached = right
+        for a in range(size - 1):
+            for b in range(a + duration, size):
+                ended[b] += between[a + duration, b]  # weight of the windows that begin by a and end at b
+            reached += after[a + duration]
+            total = reached
+            for b in range(size - 1, a, -1):
+                total += ended[b]
+                view[duration, a, b] = total
 
 
 @njit
@@ -237,10 +221,10 @@ def bound(
         first, last = gaps[gap, 0], gaps[gap, 1]
         view = tabulate(coded, node, first, last, table)
         gains = _gains(node, prior, worth, len(view))
-        for a in range(len(view)):
-            for b in range(a + 1, len(view)):
-                for duration in range(0 if worth.plain else 1, len(view) - b if worth.nested else 1):
-                    value = (worth.base + view[a, b, duration]) / worth.total
+        for duration in range(0 if worth.plain else 1, len(view) - 1 if worth.nested else 1):
+            for a in range(len(view) - duration):
+                for b in range(a + 1, len(view) - duration):
+                    value = (worth.base + view[duration, a, b]) / worth.total
                     value += gains[b - a, duration]
                     value -= worth.nesting_cost if duration else 0.0
                     if value > most:
@@ -301,16 +285,16 @@ def candidates(
         first, last = gaps[gap, 0], gaps[gap, 1]
         view = tabulate(coded, node, first, last, table)
         gains = _gains(node, prior, worth, len(view))
-        for a in range(len(view)):
-            for b in range(a + 1, len(view)):
-                for duration in range(0 if worth.plain else 1, len(view) - b if worth.nested else 1):
-                    value = (worth.base + view[a, b, duration]) / worth.total
+        for duration in range(0 if worth.plain else 1, len(view) - 1 if worth.nested else 1):
+            for a in range(len(view) - duration):
+                for b in range(a + 1, len(view) - duration):
+                    value = (worth.base + view[duration, a, b]) / worth.total
                     value += gains[b - a, duration]
                     value -= worth.nesting_cost if duration else 0.0
                     if value < enough or _dominated(view, a, b, duration, node[EXISTENTIAL] == 1, floor):
                         continue
                     times.append((first + a, first + b, duration))
-                    weights.append(view[a, b, duration])
+                    weights.append(view[duration, a, b])
                     most.append(value)
     found = np.empty((len(times), 3), dtype=np.int64)
     for k in range(len(times)):
@@ -324,58 +308,16 @@ def _dominated(view: NDArray[np.float64], a: int, b: int, duration: int, existen
     ticks, most = len(view), -np.inf
     if existential:
         if a + 1 < b:
-            most = max(view[a + 1, b, duration], view[a, b - 1, duration])
+            most = max(view[duration, a + 1, b], view[duration, a, b - 1])
         if duration > 0 and b + duration + 1 < ticks:
-            most = max(most, view[a, b, duration + 1])
+            most = max(most, view[duration + 1, a, b])
         if duration > 0 and a + 1 < b:
-            most = max(most, view[a, b - 1, duration + 1])
+            most = max(most, view[duration + 1, a, b - 1])
     else:
         if a > 0:
-            most = view[a - 1, b, duration]
+            most = view[duration, a - 1, b]
         if b + 1 + duration < ticks:
-            most = max(most, view[a, b + 1, duration])
+            most = max(most, view[duration, a, b + 1])
         if duration >= 2:
-            most = max(most, view[a, b, duration - 1], view[a, b + 1, duration - 1])
-    return most >= view[a, b, duration] and most > floor
-
-
-@njit
-def signature(
-    coded: Coded, existential: bool, complemented: bool, sides: NDArray[np.int64], times: NDArray[np.int64]
-) -> NDArray[np.bool_]:
-    """Whether each trajectory satisfies a primitive, by the weak view, shape ``(n,)``."""
-    row = np.empty(coded.alive.shape[1], dtype=np.uint64)
-    result = np.empty(len(coded.positive), dtype=np.bool_)
-    for i in range(len(result)):
-        _signal(coded, i, existential, complemented, sides, row)
-        result[i] = _begins(row, times) == existential
-    return result
-
-
-@njit
-def weigh(
-    coded: Coded, existential: bool, complemented: bool, sides: NDArray[np.int64], times: NDArray[np.int64]
-) -> float:
-    """The weight of the trajectories that a primitive classifies rightly."""
-    row = np.empty(coded.alive.shape[1], dtype=np.uint64)
-    right = 0.0
-    for i in range(len(coded.positive)):
-        _signal(coded, i, existential, complemented, sides, row)
-        if (_begins(row, times) == existential) == coded.positive[i]:
-            right += coded.weights[i]
-    return right
-
-
-@njit
-def _begins(row: NDArray[np.uint64], times: NDArray[np.int64]) -> bool:
-    """Whether a run of duration + 1 ticks begins in the window; the row has bits for all its ticks."""
-    tick, last, duration = times[0], times[1], times[2]
-    while tick <= last:
-        tick = _next(row, tick, np.uint64(0))
-        if tick > last:
-            return False
-        end = _next(row, tick, ~np.uint64(0))
-        if end - tick > duration:
-            return True
-        tick = end + 1
-    return False
+            most = max(most, view[duration - 1, a, b], view[duration - 1, a, b + 1])
+    return most >= view[duration, a, b] and most > floor
