@@ -14,6 +14,7 @@ COARSE = 12
 
 _LIMITS = 5  # ticks by which the first primitive of a beginning has to end, or from which on it has to start
 _KEEP = 4.0  # while places are empty, an average positive trajectory counts as much as so many negative ones
+_NEARLY = 0.98  # as much better than a trivial formula as the best beginning so far
 _CLIMBED = 4  # beginnings that are improved, of all those of one size
 
 Scored = tuple[float, Draft]
@@ -21,7 +22,7 @@ Scored = tuple[float, Draft]
 
 @dataclass(slots=True)
 class Bar:
-    """What a beginning has to be worth: better than a trivial formula, by half of what the best so far is better."""
+    """What a beginning has to be worth: better than a trivial formula, by nearly as much as the best so far."""
 
     trivial: float
     least: float
@@ -33,7 +34,7 @@ class Bar:
 
     def met(self, value: float) -> None:
         """Take note of a beginning."""
-        self.least = max(self.least, self.trivial + (value - self.trivial) / 2)
+        self.least = max(self.least, self.trivial + _NEARLY * (value - self.trivial))
 
 
 def emphasis(drafter: Drafter) -> float:
