@@ -227,9 +227,10 @@ def paths_of(prior: MarkovPrior, rng: np.random.Generator, count: int) -> np.nda
     class_weight=st.sampled_from(WEIGHTS),
     supported=st.booleans(),
     continuous=st.booleans(),
+    ragged=st.booleans(),
 )
 def test_a_prior_under_which_tight_formulas_are_impossible(
-    seed, information_weight, class_weight, supported, continuous
+    seed, information_weight, class_weight, supported, continuous, ragged
 ):
     """Of a robot that never stays, the tightest primitive that classifies as well may be worth less."""
     rng = np.random.default_rng(seed)
@@ -243,7 +244,9 @@ def test_a_prior_under_which_tight_formulas_are_impossible(
     prior = MarkovPrior(start / start.sum(), step / step.sum(axis=1, keepdims=True), places, ("x", "y"), 5)
     labels = np.where(rng.random(10) < 0.5, 1, -1)
     labels[:2] = 1, -1
-    data = LabelledTrajectories.from_arrays(paths_of(prior, rng, 10), labels, ("x", "y"))
+    # what ends early may satisfy weakly what no path does
+    lengths = rng.integers(3, 7, 10) if ragged else None
+    data = LabelledTrajectories.from_arrays(paths_of(prior, rng, 10), labels, ("x", "y"), lengths)
     space = SearchSpace.from_data(data) if continuous else SearchSpace.grid(3, 5)
     problem = problem_of(
         data, prior, space, information_weight=information_weight, class_weight=class_weight, supported=supported

@@ -39,7 +39,7 @@ from tickwise.inference.boxes import (
 )
 from tickwise.inference.gains import gain_bound
 from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
-from tickwise.inference.levels import Coded, Levels
+from tickwise.inference.levels import WORD, Coded, Levels
 from tickwise.inference.prior import Prior
 from tickwise.inference.scan import Worth, candidates, weigh
 from tickwise.inference.slot import Slot
@@ -245,7 +245,7 @@ class _Search:
         self.slot = problem.slot or Slot.alone(len(problem.levels.variables))
         limits = gain_bound(self.prior, problem.levels, problem.slot)
         self.bounds = Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads)
-        self.rejected = float(problem.coded.weights[~problem.coded.positive].sum())
+        self.rejected = float(problem.coded.weights[~self._decided()].sum())
         self.best = _Best()
         self.heap: list[tuple[float, tuple[float, ...], int, Node]] = []
         self.order = itertools.count()
@@ -346,13 +346,21 @@ class _Search:
     def _weigh(self, node: Node, times: NDArray[np.int64]) -> float:
         return float(weigh(self.problem.coded, node[0] == 1, node[1] == 1, ranges(node)[:, 0].reshape(-1), times))
 
+    def _decided(self) -> NDArray[np.bool_]:
+        """The trajectories with label 1 that do not end before the formula's last tick."""
+        ends = np.delete(self.slot.times[:, 1] + self.slot.times[:, 2], self.slot.index)
+        last = max(*(high for _, high in self.problem.gaps), 0, *ends.tolist())
+        word, bit = last // WORD, np.uint64(1 << last % WORD)
+        alive: NDArray[np.bool_] = (self.problem.coded.alive[:, word] & bit) != 0
+        return alive & self.problem.coded.positive
+
     def _floor(self, node: Node) -> float:
         """The weight above which all of a box's primitives are known to have a positive probability."""
         if self.problem.worth.information_weight == 0:
             return -math.inf
         if len(self.slot.shape.operators) == 1 and lasting(self.prior, *box_of(node, self.sides), bool(node[1])):
             return -math.inf
-        # one that classifies more rightly than rejecting all is satisfied by a trajectory that is possible
+        # one that is right of more than these is satisfied by a possible trajectory, and not for its early end
         return self.rejected if self.problem.supported else math.inf
 
     def _log_probability(
