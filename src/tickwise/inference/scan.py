@@ -122,7 +122,9 @@ def tabulate(
     """
     ticks = last - first + 1
     view = table[:ticks, :ticks, :ticks]
-    view[:] = 0.0
+    for a in range(ticks):  # a sixth of the table is read
+        for b in range(a + 1, ticks):
+            view[a, b, : ticks - b] = 0.0
     never = np.zeros(ticks + 1)  # weight of the trajectories whose longest run has so many ticks
     row = np.empty(coded.alive.shape[1], dtype=np.uint64)
     begins, ends = np.empty(ticks // 2 + 1, dtype=np.int64), np.empty(ticks // 2 + 1, dtype=np.int64)
@@ -186,18 +188,19 @@ def _sum_up(view: NDArray[np.float64], right: float, never: NDArray[np.float64])
     """Turn weights at maximal windows into sums over all windows that they contain."""
     ticks = len(view)
     for a in range(ticks):
-        for b in range(ticks - 2, a, -1):
-            for duration in range(ticks - b - 1):
-                view[a, b, duration] += view[a, b + 1, duration]
-    for a in range(1, ticks):
+        for b in range(ticks - 1, a, -1):
+            if b + 1 < ticks:
+                for duration in range(ticks - b - 1):
+                    view[a, b, duration] += view[a, b + 1, duration]
+        if a > 0:  # with the sums of the row before, while this one is at hand
+            for b in range(a + 1, ticks):
+                for duration in range(ticks - b):
+                    view[a, b, duration] += view[a - 1, b, duration]
+    always = right + np.cumsum(never)
+    for a in range(ticks):
         for b in range(a + 1, ticks):
             for duration in range(ticks - b):
-                view[a, b, duration] += view[a - 1, b, duration]
-    for duration in range(ticks):
-        right += never[duration]
-        for a in range(ticks - duration):
-            for b in range(a + 1, ticks - duration):
-                view[a, b, duration] += right
+                view[a, b, duration] += always[duration]
 
 
 @njit
