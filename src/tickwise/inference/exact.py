@@ -49,6 +49,7 @@ from tickwise.logic.sdnf import Operator, Primitive
 
 _BATCH = 64  # nodes a compiled call; between two of them Ctrl-C, time and memory are looked at
 _TIE = 1e-12  # values nearer than this are equal
+_FEW = 1000  # trajectories that are weighed sooner than a probability is computed
 _DIVES = 32  # batches that also look at a box of the best node, so that a search that is stopped has something good
 
 KINDS = tuple(itertools.product((True, False), (False, True)))
@@ -316,7 +317,8 @@ class _Search:
         enough = best.value - _TIE
         found = candidates(problem.coded, node, *self.bounds.arguments, enough, floor)
         informed = worth.information_weight > 0
-        near_ones = tighter(node, problem.levels) if informed and best.node is not None else ()
+        few = len(problem.coded.positive) <= _FEW
+        near_ones = tighter(node, problem.levels) if informed and few and best.node is not None else ()
         neighbours = [(near, self._floor(near)) for near in near_ones]
         for k in np.argsort(-found[2], kind="stable"):
             times, weight, most = found[0][k], float(found[1][k]), float(found[2][k])
