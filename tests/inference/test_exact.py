@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.inference.exhaustive import best_of_all, problem_of
+from tests.inference.exhaustive import Choice, best_of_all, every_time, problem_of, worth
 from tests.inference.worlds import grid_prior
 from tickwise.errors import ConfigurationError, UnknownVariableError
 from tickwise.inference.bounding import Bounds
 from tickwise.inference.boxes import Node
-from tickwise.inference.exact import ExactProblem, ExactSettings, exact_search
+from tickwise.inference.exact import ExactProblem, ExactSettings, beyond_levels, exact_search
 from tickwise.inference.objective import trajectory_weights
-from tickwise.inference.prior import BoxPrior, MarkovPrior, Prior
+from tickwise.inference.prior import BoxPrior, MarkovPrior, PathPrior, Prior
 from tickwise.inference.space import OPERATORS, Gaps, SearchSpace
 from tickwise.inference.trajectories import LabelledTrajectories
 
@@ -206,3 +206,93 @@ def test_a_prior_that_lacks_a_variable():
     problem = problem_of(DATA, BoxPrior({"x": (0, 3)}, 5), SearchSpace.grid(3, 5))
     with pytest.raises(UnknownVariableError, match="the prior has no variable 'y'"):
         exact_search(problem, ExactSettings())
+
+
+def paths_of(prior: MarkovPrior, rng: np.random.Generator, count: int) -> np.ndarray:
+    """Trajectories that a prior can give, each of its full length."""
+    arrays = prior.arrays(("x", "y"))
+    step = np.asarray(prior.transition) * 1.0
+    states = np.empty((count, arrays.horizon + 1), dtype=int)
+    for row in states:
+        row[0] = rng.choice(len(step), p=np.asarray(prior.initial))
+        for tick in range(1, len(row)):
+            row[tick] = rng.choice(len(step), p=step[row[tick - 1]])
+    return arrays.coordinates[states]
+
+
+@settings(max_examples=40)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    information_weight=st.sampled_from((0.01, 0.3, 1.0)),
+    class_weight=st.sampled_from(WEIGHTS),
+    supported=st.booleans(),
+    continuous=st.booleans(),
+    ragged=st.booleans(),
+)
+def test_a_prior_under_which_tight_formulas_are_impossible(
+    seed, information_weight, class_weight, supported, continuous, ragged
+):
+    """Of a robot that never stays, the tightest primitive that classifies as well may be worth less."""
+    rng = np.random.default_rng(seed)
+    states = int(rng.integers(3, 6))
+    step = np.zeros((states, states))
+    for here in range(states):  # few steps, none of them to the state itself
+        others = np.delete(np.arange(states), here)
+        step[here, rng.choice(others, int(rng.integers(1, 3)), replace=False)] = rng.uniform(0.1, 1)
+    start = (rng.random(states) < 0.6) + 1e-3 * (np.arange(states) == 0)
+    places = rng.integers(0, 3, (states, 2)) + 0.5
+    prior = MarkovPrior(start / start.sum(), step / step.sum(axis=1, keepdims=True), places, ("x", "y"), 5)
+    labels = np.where(rng.random(10) < 0.5, 1, -1)
+    labels[:2] = 1, -1
+    # what ends early may satisfy weakly what no path does
+    lengths = rng.integers(3, 7, 10) if ragged else None
+    data = LabelledTrajectories.from_arrays(paths_of(prior, rng, 10), labels, ("x", "y"), lengths)
+    space = SearchSpace.from_data(data) if continuous else SearchSpace.grid(3, 5)
+    problem = problem_of(
+        data, prior, space, information_weight=information_weight, class_weight=class_weight, supported=supported
+    )
+    check(problem, data, class_weight)
+
+
+@settings(max_examples=25)
+@given(
+    seed=st.integers(0, 2**32 - 1), cap=st.integers(1, 6), information_weight=st.sampled_from((0.0, 0.02, 0.3)),
+    independent=st.booleans(),
+)  # fmt: skip
+def test_a_bound_on_what_more_levels_could_give(seed, cap, information_weight, independent):
+    rng = np.random.default_rng(seed)
+    values = rng.normal(size=(14, 5, 2)).cumsum(axis=1).round(1)
+    labels = np.where(rng.random(14) < 0.5, 1, -1)
+    labels[:2] = 1, -1
+    data = LabelledTrajectories.from_arrays(values, labels, ("x", "y"))
+    space = SearchSpace.from_data(data)
+    prior: Prior = BoxPrior(dict(zip(data.variables, space.edges, strict=True)), 4)
+    if not independent:
+        places = values.reshape(-1, 2)[:6]
+        prior = PathPrior(np.ones((6, 6)), places, ("x", "y"), 4)
+    coarse, fine = (
+        problem_of(data, prior, space, information_weight=information_weight, cap=most) for most in (cap, 1000)
+    )
+    assert fine.levels.complete
+    limit = beyond_levels(coarse, ExactSettings())
+    weights = np.ones(len(data))
+    assert limit >= exact_search(coarse, ExactSettings()).value - 1e-12
+    if information_weight == 0 or not independent:
+        assert limit >= exact_search(fine, ExactSettings()).value - 1e-12
+    for _ in range(300):  # sides at the resolution that the bound is about
+        sides = [np.sort(rng.choice(len(levels), 2, replace=False)) for levels in fine.levels.sides]
+        (lower, upper) = (tuple(int(pair[end]) for pair in sides) for end in (0, 1))
+        operator = OPERATORS[rng.integers(4)]
+        times = list(every_time(fine.gaps, operator))
+        choice = Choice(operator, bool(rng.integers(2)), times[rng.integers(len(times))], lower, upper)
+        assert limit >= worth(fine, data, weights, choice) - 1e-12
+
+
+def test_all_thresholds_leave_nothing_beyond_them():
+    data = numbers(3, 5, 12, 2)
+    problem = problem_of(data, grid_prior(5, 4), SearchSpace.from_data(data), information_weight=0.0)
+    assert problem.levels.complete
+    value = exact_search(problem, ExactSettings()).value
+    assert value - 1e-12 <= beyond_levels(problem, ExactSettings())
+    stopped = beyond_levels(problem, ExactSettings(seconds=1e-9))
+    assert stopped >= beyond_levels(problem, ExactSettings(threads=2))

@@ -39,7 +39,7 @@ from tickwise.inference.boxes import (
 )
 from tickwise.inference.gains import gain_bound
 from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
-from tickwise.inference.levels import Coded, Levels
+from tickwise.inference.levels import WORD, Coded, Levels
 from tickwise.inference.prior import Prior
 from tickwise.inference.scan import Worth, candidates
 from tickwise.inference.signals import weigh
@@ -49,6 +49,7 @@ from tickwise.inference.support import lasting
 from tickwise.logic.sdnf import Operator, Primitive
 
 _BATCH = 64  # nodes a compiled call; between two of them Ctrl-C, time and memory are looked at
+_FEW = 1000  # trajectories that are weighed sooner than a probability is computed
 _DIVES = 32  # batches that also look at a box of the best node, so that a search that is stopped has something good
 
 TIE = 1e-12
@@ -270,7 +271,7 @@ class _Search:
         self.slot = problem.slot or Slot.alone(len(problem.levels.variables))
         limits = gain_bound(self.prior, problem.levels, problem.slot)
         self.bounds = Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads)
-        self.rejected = float(problem.coded.weights[~problem.coded.positive].sum())
+        self.rejected = float(problem.coded.weights[~self._decided()].sum())
         self.best = _Best(least)
         self.heap: list[tuple[float, tuple[float, ...], int, Node]] = []
         self.order = itertools.count()
@@ -346,7 +347,8 @@ class _Search:
         enough = best.value - TIE
         found = candidates(problem.coded, node, *self.bounds.arguments, enough, floor)
         informed = worth.information_weight > 0
-        near_ones = tighter(node, problem.levels) if informed and best.node is not None else ()
+        few = len(problem.coded.positive) <= _FEW
+        near_ones = tighter(node, problem.levels) if informed and few and best.node is not None else ()
         neighbours = [(near, self._floor(near)) for near in near_ones]
         for k in np.argsort(-found[2], kind="stable"):
             times, weight, most = found[0][k], float(found[1][k]), float(found[2][k])
@@ -372,13 +374,21 @@ class _Search:
     def _weigh(self, node: Node, times: NDArray[np.int64]) -> float:
         return float(weigh(self.problem.coded, node[0] == 1, node[1] == 1, ranges(node)[:, 0].reshape(-1), times))
 
+    def _decided(self) -> NDArray[np.bool_]:
+        """The trajectories with label 1 that do not end before the formula's last tick."""
+        ends = np.delete(self.slot.times[:, 1] + self.slot.times[:, 2], self.slot.index)
+        last = max(*(high for _, high in self.problem.gaps), 0, *ends.tolist())
+        word, bit = last // WORD, np.uint64(1 << last % WORD)
+        alive: NDArray[np.bool_] = (self.problem.coded.alive[:, word] & bit) != 0
+        return alive & self.problem.coded.positive
+
     def _floor(self, node: Node) -> float:
         """The weight above which all of a box's primitives are known to have a positive probability."""
         if self.problem.worth.information_weight == 0:
             return -math.inf
         if len(self.slot.shape.operators) == 1 and lasting(self.prior, *box_of(node, self.sides), bool(node[1])):
             return -math.inf
-        # one that classifies more rightly than rejecting all is satisfied by a trajectory that is possible
+        # one that is right of more than these is satisfied by a possible trajectory, and not for its early end
         return self.rejected if self.problem.supported else math.inf
 
     def _log_probability(
