@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tickwise.inference.draft import Draft, Drafter, Structure, filled
 from tickwise.inference.exact import TIE
+from tickwise.logic.syntax import Interval
 
 COARSE = 12
 """Levels of continuous variables while beginnings are looked for."""
 
-_LIMITS = 5  # ticks by which the first primitive of a beginning has to end, or from which on it has to start
+_CUTS = 8  # parts of the first primitive's window, at the ends of which it may end, or start, too
 _KEEP = 4.0  # while places are empty, an average positive trajectory counts as much as so many negative ones
 _NEARLY = 0.98  # as much better than a trivial formula as the best beginning so far
 _CLIMBED = 4  # beginnings that are improved, of all those of one size
@@ -55,19 +56,17 @@ def climb(drafter: Drafter, begun: Iterable[tuple[Draft, Structure]]) -> list[Sc
     return sorted(((value, draft) for draft, value in peaks.items()), key=lambda pair: -pair[0])
 
 
-def retimed(drafter: Drafter, structure: Structure, draft: Draft, j: int) -> Iterator[Draft]:
-    """A draft, and the same box earlier, where places follow, or later, where places are before it."""
-    primitive, horizon = draft[0][j], drafter.space.horizon
+def retimed(draft: Draft, j: int) -> Iterator[Draft]:
+    """A draft, and its primitive in place j with less of its window, to leave time for places after or before it."""
+    primitive = draft[0][j]
     assert primitive is not None
-    box, seen = drafter.node(primitive), {primitive}
     yield draft
-    for step in range(1, _LIMITS + 1):
-        end = horizon * step // (_LIMITS + 1)
-        for within in [(0, end)] * (j + 1 < len(draft[0])) + [(horizon - end, horizon)] * (j > 0):
-            found = drafter.place(draft, structure, 0, j, positives=emphasis(drafter), within=within, box=box)
-            if found is not None and found.primitive not in seen:
-                seen.add(found.primitive)
-                yield filled(draft, 0, j, found.primitive)
+    start, end = primitive.window.start, primitive.window.end
+    for cut in dict.fromkeys(start + (end - start) * step // _CUTS for step in range(1, _CUTS)):
+        if j + 1 < len(draft[0]) and cut > start:
+            yield filled(draft, 0, j, replace(primitive, window=Interval(start, cut)))
+        if j > 0 and cut < end:
+            yield filled(draft, 0, j, replace(primitive, window=Interval(cut, end)))
 
 
 def completed(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 
 from tickwise.errors import DataError
 from tickwise.inference.beginnings import COARSE, Bar, climb, completed, emphasis, retimed
 from tickwise.inference.draft import FREE, Draft, Drafter, Structure, coarser, formula_of
-from tickwise.inference.exact import ExactSettings
+from tickwise.inference.exact import TIE, ExactSettings
 from tickwise.inference.fit import Fit
 from tickwise.inference.objective import trajectory_weights
 from tickwise.inference.prior import Prior
@@ -70,7 +71,7 @@ def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:
         rate: ζ: no other formula is looked for once one has this classification rate.
 
     Returns:
-        The best formula found of each size, up to the first with the rate.
+        The best formula found of each size, up to the first with the rate or, where none has it, up to the best.
     """
     single = drafter.place(_ALONE, ((FREE,),), 0, 0, least=rate - drafter.nesting_cost)
     if single is not None and drafter.rate(((single.primitive,),)) >= rate:
@@ -86,10 +87,12 @@ def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:
         if found is None or drafter.interrupted:
             continue
         grown = _grown(drafter, rough, ((found.primitive,),), size, rate)
-        best = [max(pair, key=drafter.value) for pair in zip(best, grown, strict=False)] or grown
+        pairs = itertools.zip_longest(best, grown)
+        best = [max((draft for draft in pair if draft), key=drafter.value) for pair in pairs]
         if drafter.rate(grown[-1]) >= rate:
             return grown
-    return best
+    values = [drafter.value(draft) for draft in best]
+    return best[: 1 + next(k for k, value in enumerate(values) if value >= max(values) - TIE)] if best else []
 
 
 def _grown(drafter: Drafter, rough: Drafter, seed: Draft, size: int, rate: float) -> list[Draft]:
@@ -111,7 +114,7 @@ def _extended(drafter: Drafter, draft: Draft, bar: Bar) -> Iterator[tuple[Draft,
         for j in range(len(row), -1, -1):
             wider: Draft = (*draft[:i], (*row[:j], None, *row[j:]), *draft[i + 1 :])
             structure = _free(wider)
-            begun = retimed(drafter, structure, wider, 1 - j) if len(draft) == len(row) == 1 else [wider]
+            begun = retimed(wider, 1 - j) if len(draft) == len(row) == 1 else [wider]
             for one in begun:
                 yield from ((full, structure) for full in completed(drafter, structure, one, i, [j], bar))
     more: Draft = (*draft, (None,))

@@ -56,7 +56,7 @@ def _firsts(drafter: Drafter, structure: Structure, draft: Draft, j: int) -> Ite
     alone = len(structure[0]) == 1
     found = drafter.place(draft, structure, 0, j, positives=1.0 if alone else emphasis(drafter))
     if found is not None:
-        yield from retimed(drafter, structure, filled(draft, 0, j, found.primitive), j)
+        yield from retimed(filled(draft, 0, j, found.primitive), j)
 
 
 def _coverings(drafter: Drafter, structure: Structure, known: Draft) -> Iterator[Draft]:
