@@ -10,7 +10,7 @@ from tickwise.inference.draft import Draft, Drafter, Structure, filled
 from tickwise.inference.exact import TIE
 from tickwise.logic.syntax import Interval
 
-COARSE = 12
+COARSE = 10
 """Levels of continuous variables while beginnings are looked for."""
 
 _CUTS = 8  # parts of the first primitive's window, at the ends of which it may end, or start, too

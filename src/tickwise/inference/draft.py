@@ -11,7 +11,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.inference.boxes import Node
 from tickwise.inference.counting import log_probability
 from tickwise.inference.exact import TIE, ExactProblem, ExactResult, ExactSettings, improve
 from tickwise.inference.kernels import Shape
@@ -181,8 +180,6 @@ class Drafter:
         j: int,
         *,
         positives: float = 1.0,
-        within: tuple[int, int] | None = None,
-        box: Node | None = None,
         least: float = -math.inf,
     ) -> ExactResult | None:
         """The best primitive for place j of disjunct i, all others held.
@@ -194,8 +191,6 @@ class Drafter:
             j: The place in it.
             positives: How many times their weight trajectories with label 1 count; more than once where other
                 places are still empty, since what one primitive of a conjunction rejects no other gets back.
-            within: Ticks that it has to lie in.
-            box: A node with the only box that it may have; None for any.
             least: The least `value` of the draft with it.
 
         Returns:
@@ -203,8 +198,6 @@ class Drafter:
         """
         choice = structure[i][j]
         gap = self._gap(draft, structure, i, j)
-        if within is not None:
-            gap = max(gap[0], within[0]), min(gap[1], within[1])
         if self.interrupted or gap[1] - gap[0] + 1 < choice.span:
             return None
         others = self._all_of(filled(draft, i, j, None)[i])
@@ -222,9 +215,8 @@ class Drafter:
             self.nesting_cost * share, self.information_weight * share,
         )  # fmt: skip
         coded = self.coded._replace(weights=weights).select(matters)
-        roots = None if box is None else [np.array([*kind, *box[2:]]) for kind in choice.kinds]
         problem = ExactProblem(
-            coded, self.levels, self.prior, (gap,), worth, choice.kinds, self._slot(draft, i, j), self.supported, roots
+            coded, self.levels, self.prior, (gap,), worth, choice.kinds, self._slot(draft, i, j), self.supported
         )
         found = improve(problem, self.settings, least + self._cost(filled(draft, i, j, None)))
         self.interrupted = self.interrupted or (found is not None and found.interrupted)
@@ -253,15 +245,6 @@ class Drafter:
                 break
             at = (at + 1) % len(places)
         return draft, value
-
-    def node(self, primitive: Primitive) -> Node:
-        """The node of a primitive's box alone, whose sides are levels."""
-        _, _, lower, upper = self._rows(primitive)
-        low, high = (
-            [int(np.searchsorted(*pair)) for pair in zip(self.levels.sides, ends, strict=True)]
-            for ends in (lower, upper)
-        )
-        return np.array([0, 0, *low, *low, *high, *high])
 
     def _all_of(self, row: Sequence[Primitive | None]) -> NDArray[np.bool_]:
         result = np.ones(len(self.data), dtype=np.bool_)

@@ -137,7 +137,6 @@ class ExactProblem:
         kinds: Pairs of `KINDS` that are allowed.
         slot: The formula that the primitive is part of; None for the primitive alone.
         supported: Whether each trajectory with label 1 is known to be possible under the prior.
-        roots: Where to look only; None for all boxes of the kinds.
     """
 
     coded: Coded
@@ -148,7 +147,6 @@ class ExactProblem:
     kinds: Sequence[tuple[bool, bool]] = KINDS
     slot: Slot | None = None
     supported: bool = False
-    roots: Sequence[Node] | None = None
 
 
 def worth_of(
@@ -281,8 +279,7 @@ class _Search:
         clock, interrupted, bound = _Clock(self.settings.seconds), False, math.inf
         with self.bounds:
             try:
-                kinds, roots = self.problem.kinds, self.problem.roots
-                self._push([root(self.problem.levels, *kind) for kind in kinds] if roots is None else list(roots))
+                self._push([root(self.problem.levels, *kind) for kind in self.problem.kinds])
                 batches = 0
                 while self.heap:
                     bound = -self.heap[0][0]  # of all that is left, also while some of it is taken off the heap
