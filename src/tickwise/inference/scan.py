@@ -47,7 +47,7 @@ class Worth(NamedTuple):
 
 
 @njit
-def _next(row: NDArray[np.uint64], tick: int, flip: np.uint64) -> int:
+def next_bit(row: NDArray[np.uint64], tick: int, flip: np.uint64) -> int:
     """The first tick from ``tick`` on whose bit is set (or clear, where all bits are flipped); the end if none is."""
     word = tick // WORD
     bits = (row[word] ^ flip) >> np.uint64(tick % WORD)
@@ -61,7 +61,7 @@ def _next(row: NDArray[np.uint64], tick: int, flip: np.uint64) -> int:
 
 
 @njit
-def _signal(
+def signal(
     coded: Coded, i: int, existential: bool, complemented: bool, sides: NDArray[np.int64], row: NDArray[np.uint64]
 ) -> None:
     """The ticks of a trajectory at which a predicate holds, or for □ and □◇ is violated.
@@ -137,7 +137,7 @@ def tabulate(
         weight = coded.weights[i] if positive else -coded.weights[i]
         if positive == existential:
             right += coded.weights[i]
-        _signal(coded, i, existential, complemented, outer if positive != complemented else inner, row)
+        signal(coded, i, existential, complemented, outer if positive != complemented else inner, row)
         _add_gaps(row, first, last, sign * weight, begins, ends, view, never)
     _sum_up(view, right, never)
     return view
@@ -157,10 +157,10 @@ def _add_gaps(
     """Add a trajectory's weight at its maximal windows in which no run of c + 1 ticks begins, for every c."""
     runs, longest, tick = 0, 0, first
     while tick <= last:
-        tick = _next(row, tick, np.uint64(0))
+        tick = next_bit(row, tick, np.uint64(0))
         if tick > last:
             break
-        end = min(_next(row, tick, ~np.uint64(0)) - 1, last)
+        end = min(next_bit(row, tick, ~np.uint64(0)) - 1, last)
         begins[runs], ends[runs] = tick - first, end - first
         longest = max(longest, end - tick + 1)
         runs += 1
@@ -347,8 +347,8 @@ def signature(
     row = np.empty(coded.alive.shape[1], dtype=np.uint64)
     result = np.empty(len(coded.positive), dtype=np.bool_)
     for i in range(len(result)):
-        _signal(coded, i, existential, complemented, sides, row)
-        result[i] = _begins(row, times) == existential
+        signal(coded, i, existential, complemented, sides, row)
+        result[i] = run_begins(row, times) == existential
     return result
 
 
@@ -360,21 +360,21 @@ def weigh(
     row = np.empty(coded.alive.shape[1], dtype=np.uint64)
     right = 0.0
     for i in range(len(coded.positive)):
-        _signal(coded, i, existential, complemented, sides, row)
-        if (_begins(row, times) == existential) == coded.positive[i]:
+        signal(coded, i, existential, complemented, sides, row)
+        if (run_begins(row, times) == existential) == coded.positive[i]:
             right += coded.weights[i]
     return right
 
 
 @njit
-def _begins(row: NDArray[np.uint64], times: NDArray[np.int64]) -> bool:
+def run_begins(row: NDArray[np.uint64], times: NDArray[np.int64]) -> bool:
     """Whether a run of duration + 1 ticks begins in the window; the row has bits for all its ticks."""
     tick, last, duration = times[0], times[1], times[2]
     while tick <= last:
-        tick = _next(row, tick, np.uint64(0))
+        tick = next_bit(row, tick, np.uint64(0))
         if tick > last:
             return False
-        end = _next(row, tick, ~np.uint64(0))
+        end = next_bit(row, tick, ~np.uint64(0))
         if end - tick > duration:
             return True
         tick = end + 1
