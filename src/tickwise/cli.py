@@ -8,7 +8,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from functools import wraps
 from importlib.metadata import version as package_version
 from pathlib import Path
@@ -214,14 +214,17 @@ def infer(
     information_weight: Annotated[float, typer.Option(min=0, help="The weight of the information gain, λ.")] = 0.01,
     depth: Annotated[int, typer.Option(min=1, help="The depth of the decision tree, h_max.")] = 2,
     class_weight: Annotated[str | None, typer.Option(help="'balanced' lets both labels count the same.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="The seed of the search.")] = 0,
+    search: Annotated[str, typer.Option(help="exact, joint (all primitives at once) or the paper's swarm.")] = "exact",
+    seconds: Annotated[float | None, typer.Option(help="The most that one exact search may take.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="The seed of the swarm.")] = 0,
     as_json: JsonFlag = False,
 ) -> None:
     """Infer the formula that tells trajectories with label 1 from those with label -1.
 
-    For example: tickwise infer logs.csv --rate 0.98
+    Ctrl-C ends an exact search with the best formula so far. For example: tickwise infer logs.csv --search joint
     """
     from tickwise.inference.classifier import MITLClassifier
+    from tickwise.inference.exact import ExactSettings
     from tickwise.inference.information import information_gain
     from tickwise.inference.reading import read_trajectories
     from tickwise.inference.tree import classification_rate
@@ -230,11 +233,13 @@ def infer(
     known = read_trajectories(data).require_both_classes()
     model = MITLClassifier(
         size=size, rate=rate, information_weight=information_weight, depth=depth, class_weight=class_weight,
-        random_state=seed, variables=known.variables,
+        random_state=seed, variables=known.variables, search=search,
+        limits=ExactSettings(seconds=seconds, threads=os.cpu_count() or 1),
     )  # fmt: skip
     began = time.monotonic()
-    model.fit([values[:length] for values, length in zip(known.values, known.lengths, strict=True)], known.labels)
-    seconds = time.monotonic() - began
+    with messages.status("searching ...") if messages.is_terminal else nullcontext():
+        model.fit([values[:length] for values, length in zip(known.values, known.lengths, strict=True)], known.labels)
+    spent = time.monotonic() - began
     formula = model.formula_
     facts = {
         "formula": None if formula is None else str(formula),
@@ -242,8 +247,8 @@ def infer(
         "information_gain": None if formula is None else information_gain(formula, model.prior_),
         "size": None if formula is None else formula.size,
         "satisfying": model.satisfying_,
-        "seconds": round(seconds, 3),
-    }
+        "seconds": round(spent, 3), "search": search, "gap": model.gap_, "interrupted": model.interrupted_,
+    }  # fmt: skip
     if as_json:
         _print_json(facts)
     elif formula is None:
@@ -254,8 +259,13 @@ def infer(
         output.print(
             f"classification rate {facts['classification_rate']:.4f}, information gain "
             f"{facts['information_gain']:.4f}, size {facts['size']}, "
-            f"{'' if facts['satisfying'] else 'not '}satisfying (Problem 1), {seconds:.1f} s"
+            f"{'' if facts['satisfying'] else 'not '}satisfying (Problem 1), {spent:.1f} s"
         )
+        if model.gap_ is not None:
+            output.print("proved to be the best" if model.gap_ == 0 else f"J can be better by {model.gap_:.2g} at most")
+    if model.interrupted_:
+        messages.print("interrupted: this is the best so far")
+        raise typer.Exit(INTERRUPTED)
 
 
 @app.command()

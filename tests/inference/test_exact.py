@@ -261,15 +261,15 @@ def test_a_prior_under_which_tight_formulas_are_impossible(
 )  # fmt: skip
 def test_a_bound_on_what_more_levels_could_give(seed, cap, information_weight, independent):
     rng = np.random.default_rng(seed)
-    values = rng.normal(size=(14, 5, 2)).cumsum(axis=1).round(1)
-    labels = np.where(rng.random(14) < 0.5, 1, -1)
+    values = rng.normal(size=(10, 4, 2)).cumsum(axis=1).round()
+    labels = np.where(rng.random(10) < 0.5, 1, -1)
     labels[:2] = 1, -1
     data = LabelledTrajectories.from_arrays(values, labels, ("x", "y"))
     space = SearchSpace.from_data(data)
-    prior: Prior = BoxPrior(dict(zip(data.variables, space.edges, strict=True)), 4)
+    prior: Prior = BoxPrior(dict(zip(data.variables, space.edges, strict=True)), 3)
     if not independent:
         places = values.reshape(-1, 2)[:6]
-        prior = PathPrior(np.ones((6, 6)), places, ("x", "y"), 4)
+        prior = PathPrior(np.ones((6, 6)), places, ("x", "y"), 3)
     coarse, fine = (
         problem_of(data, prior, space, information_weight=information_weight, cap=most) for most in (cap, 1000)
     )

@@ -40,6 +40,9 @@ class MITLClassifier:
         classes_: The labels, ``[-1, 1]``.
         variables_: Names of the columns of ``X``.
         satisfying_: Whether the formula is a satisfying formula for the training data (Problem 1).
+        gap_: How much better than the ones found the best primitives of the tree's nodes can be at most, in units of J;
+            0 where they are proved to be the best, None where nothing is known.
+        interrupted_: Whether Ctrl-C ended the search, and this is the best so far.
     """
 
     _estimator_type = "classifier"
@@ -142,12 +145,18 @@ class MITLClassifier:
         prior = self._box_prior(data, space) if self.prior is None else self.prior
         limits = ExactSettings() if self.limits is None else self.limits
         self.tree_: DecisionTree | None = None
+        self.gap_: float | None = None
+        found: SDNF | None
         if self.search == "joint":
-            found: SDNF | None = infer_jointly(data, prior, space, settings, limits).formula
+            fit = infer_jointly(data, prior, space, settings, limits)
+            self.interrupted_, found = fit.interrupted, fit.formula
         else:
             swarm = SwarmSettings() if self.swarm is None else self.swarm
             rng = generator(int(self.random_state), "inference")
             self.tree_ = infer_tree(data, prior, space, settings, limits if self.search == "exact" else swarm, rng)
+            gaps = [node.gap for node in self.tree_.nodes() if node.gap is not None]
+            self.gap_ = max(gaps, default=None)
+            self.interrupted_ = any(node.stop == "interrupted" for node in self.tree_.nodes())
             found = self.tree_.formula
         self.formula_: SDNF | None = None if found is None else readable(found, data, space)
         self.satisfying_: bool = is_satisfying(self.formula_, data, settings)

@@ -145,9 +145,9 @@ class Drafter:
     def value(self, draft: Draft) -> float:
         """J of a draft whose places are all filled, less what its nested operators cost."""
         if self.information_weight == 0:
-            return self.rate(draft) - self._cost(draft)
+            return self.rate(draft) - self.cost(draft)
         rate, gain = self.parts(draft)
-        return rate + self.information_weight * gain - self._cost(draft)
+        return rate + self.information_weight * gain - self.cost(draft)
 
     def parts(self, draft: Draft) -> tuple[float, float]:
         """Classification rate and information gain of a draft whose places are all filled."""
@@ -218,7 +218,7 @@ class Drafter:
         problem = ExactProblem(
             coded, self.levels, self.prior, (gap,), worth, choice.kinds, self._slot(draft, i, j), self.supported
         )
-        found = improve(problem, self.settings, least + self._cost(filled(draft, i, j, None)))
+        found = improve(problem, self.settings, least + self.cost(filled(draft, i, j, None)))
         self.interrupted = self.interrupted or (found is not None and found.interrupted)
         return found
 
@@ -253,7 +253,8 @@ class Drafter:
                 result &= self.signature(primitive)
         return result
 
-    def _cost(self, draft: Draft) -> float:
+    def cost(self, draft: Draft) -> float:
+        """What the nested operators of a draft cost."""
         return self.nesting_cost * sum(p is not None and p.operator.nested for row in draft for p in row)
 
     def _gap(self, draft: Draft, structure: Structure, i: int, j: int) -> tuple[int, int]:

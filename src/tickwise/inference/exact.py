@@ -70,6 +70,8 @@ class ExactSettings:
         threads: Threads that bound nodes side by side; the result does not depend on it.
         joint: Whether all primitives of a formula are found together (see `tickwise.inference.growth`), rather than one
             after the other by the greedy tree of Algorithm 1.
+        certificate: How long a fit of a structure of several primitives may try to prove that no other parameters are
+            better, in seconds (see `tickwise.inference.certificate`); 0 leaves it out.
 
     Raises:
         ConfigurationError: If a limit is out of its range.
@@ -80,6 +82,7 @@ class ExactSettings:
     nodes: int = 2_000_000
     threads: int = 1
     joint: bool = False
+    certificate: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("levels", "nodes", "threads"):
@@ -87,6 +90,8 @@ class ExactSettings:
                 raise ConfigurationError(f"exact setting {name} is {getattr(self, name)}; use 1 or more")
         if self.seconds is not None and not self.seconds > 0:
             raise ConfigurationError(f"exact setting seconds is {self.seconds}; use a number above 0, or None")
+        if not self.certificate >= 0:
+            raise ConfigurationError(f"exact setting certificate is {self.certificate}; use 0 seconds or more")
 
 
 @dataclass(frozen=True, slots=True)

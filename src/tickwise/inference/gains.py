@@ -67,7 +67,7 @@ def gain_bound(
 
 
 @njit
-def _least_measure(node: NDArray[np.int64], prior: GainBound) -> tuple[float, bool]:
+def least_measure(node: NDArray[np.int64], prior: GainBound) -> tuple[float, bool]:
     """The least positive probability of the predicate at one tick, over the boxes of a node, or less.
 
     Returns:
@@ -90,31 +90,49 @@ def _least_measure(node: NDArray[np.int64], prior: GainBound) -> tuple[float, bo
 
 
 @njit
+def run_begun(holds: float, duration: int, spans: int) -> NDArray[np.float64]:
+    """The probability that in a window of b - a + 1 independent ticks, at ``[b - a]``, there begins a run that lasts.
+
+    Args:
+        holds: The probability that the predicate holds at a tick.
+        duration: The ticks that a run goes on after its first.
+        spans: How many windows.
+    """
+    needed = duration + 1
+    run = holds**needed
+    found = np.empty(spans)
+    found[0] = run
+    for span in range(1, spans):
+        before = found[span - needed - 1] if span > needed else 0.0
+        found[span] = found[span - 1] + (1.0 - holds) * run * (1.0 - before)
+    return np.minimum(found, 1.0)
+
+
+@njit
+def never_begun(holds: float, span: int, duration: int) -> float:
+    """At most -log of the probability that no run of violations begins in a window of independent ticks and lasts.
+
+    It is enough that the predicate holds at every so many ticks, or somewhere in each block of half as many.
+    """
+    places, half = span + 1 + duration, (duration + 2) // 2
+    block = -np.log1p(-((1.0 - holds) ** half))
+    return float(min(-np.log(holds) * (places // (duration + 1)), block * ((places + half - 1) // half)))
+
+
+@njit
 def gain_bounds(node: NDArray[np.int64], prior: GainBound, ticks: int) -> NDArray[np.float64]:
     """Upper bounds on the information gain, for a window of b - a + 1 ticks and a duration c at ``[b - a, c]``."""
     bounds = np.full((ticks, ticks), min(prior.most, prior.beside))
     if not prior.independent:
         return bounds
-    holds, impossible = _least_measure(node, prior)
+    holds, impossible = least_measure(node, prior)
     if impossible and prior.beside < np.inf:  # where the primitive says nothing, the other disjuncts say all
         return bounds
     for duration in range(ticks):
-        needed = duration + 1
+        spans = ticks - duration
         if node[EXISTENTIAL] == 1:
-            # the probability that a run of so many ticks has begun, one tick after the other
-            run = holds**needed
-            found = np.empty(ticks + 1)
-            found[0] = run
-            for span in range(1, ticks - duration):
-                before = found[span - needed - 1] if span > needed else 0.0
-                found[span] = found[span - 1] + (1.0 - holds) * run * (1.0 - before)
-                bounds[span, duration] = -np.log(min(found[span], 1.0)) / prior.horizon
+            bounds[1:spans, duration] = -np.log(run_begun(holds, duration, spans)[1:]) / prior.horizon
         else:
-            # enough that the predicate holds at every so many ticks, or somewhere in each block of half as many
-            half = (duration + 2) // 2
-            block = -np.log1p(-((1.0 - holds) ** half))
-            for span in range(1, ticks - duration):
-                places = span + 1 + duration
-                cost = min(-np.log(holds) * (places // needed), block * ((places + half - 1) // half))
-                bounds[span, duration] = cost / prior.horizon
+            for span in range(1, spans):
+                bounds[span, duration] = never_begun(holds, span, duration) / prior.horizon
     return np.minimum(bounds + prior.held, prior.beside)

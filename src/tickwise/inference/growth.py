@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 
 from tickwise.errors import DataError
 from tickwise.inference.beginnings import COARSE, Bar, climb, completed, emphasis, retimed
@@ -56,7 +57,8 @@ def infer_jointly(
         raise DataError(
             "no formula tells the labels apart better than a trivial one; use other variables or a finer space"
         )
-    return Fit.of(formula_of(found[-1]), *drafter.parts(found[-1]), settings)
+    fit = Fit.of(formula_of(found[-1]), *drafter.parts(found[-1]), settings)
+    return replace(fit, interrupted=drafter.interrupted)
 
 
 def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:

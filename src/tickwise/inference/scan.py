@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from tickwise._jit import njit
 from tickwise.inference.gains import COMPLEMENTED, EXISTENTIAL, SIDES, GainBound, gain_bounds
 from tickwise.inference.levels import Coded
-from tickwise.inference.signals import next_tick, signal
+from tickwise.inference.signals import next_bit, signal
 
 OUTER, INNER = 0, 1
 
@@ -87,11 +87,13 @@ def tabulate(
     _corner(node, INNER, corners[1])
     existential, complemented = node[EXISTENTIAL] == 1, node[COMPLEMENTED] == 1
     # a violation is rightly called, and so is a satisfaction: the sign turns the one count into the other
+    at_least, at_most, alive, labels, weights = coded
     right = 0.0
-    for i in range(len(coded.positive)):
-        positive, weight = coded.positive[i], coded.weights[i]
+    for i in range(len(labels)):
+        positive, weight = labels[i], weights[i]
         right += weight * (positive == existential)
-        signal(coded, i, existential, complemented, corners[int(positive == complemented)], row)
+        sides = corners[int(positive == complemented)]
+        signal(at_least, at_most, alive, i, existential, complemented, sides, row)
         _add_gaps(row, first, last, weight * (1.0 - 2.0 * (positive == existential)), gaps, ends, lengths)
     _sum_up(gaps, right)
     return view
@@ -129,10 +131,10 @@ def _add_gaps(
     """Add a trajectory's weight; ``ends`` and ``lengths`` are room for a stack of runs, the longest at the bottom."""
     top, tick = 0, first
     while tick <= last:
-        tick = next_tick(row, tick, np.uint64(0))
+        tick = next_bit(row, tick, np.uint64(0))
         if tick > last:
             break
-        end = min(next_tick(row, tick, ~np.uint64(0)) - 1, last)
+        end = min(next_bit(row, tick, ~np.uint64(0)) - 1, last)
         begin, length, hidden = tick - first, end - tick + 1, 0
         while top > 0:  # the runs that this one sees over those between, which are at most `hidden` long
             shorter = min(lengths[top - 1], length)

@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError
-from tickwise.inference.draft import Drafter, draft_of, formula_of, structure_of
+from tickwise.inference.certificate import certify
+from tickwise.inference.draft import Draft, Drafter, draft_of, formula_of, structure_of
+from tickwise.inference.draft import Structure as DraftStructure
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.fit import Fit
 from tickwise.inference.joint import fit_jointly
@@ -61,7 +63,9 @@ def fit_structure(
 ) -> Fit:
     """Optimise all parameters of one formula together, its operators fixed.
 
-    An exact search goes through the primitives one at a time, from many beginnings (see `tickwise.inference.joint`).
+    An exact search goes through the primitives one at a time, from many beginnings (see `tickwise.inference.joint`). Of
+    a structure of one primitive it proves its formula to be the best; of others it says how much better the best one
+    can be, where `ExactSettings.certificate` gives it the time.
 
     A swarm moves all parameters at once. Then each primitive in turn is searched anew with the others held, until none
     gets better: windows of neighbours push each other, and a joint move that keeps all good is rare. All of this is
@@ -97,10 +101,25 @@ def fit_structure(
     weights = trajectory_weights(data.labels, settings.class_weight)
     if isinstance(search, ExactSettings):
         drafter = Drafter(data, weights, prior, space, settings.information_weight, 0.0, search)
-        found = fit_jointly(drafter, structure_of(pairs), None if start is None else draft_of(start))
-        assert found is not None  # there is room for the structure
-        return Fit.of(formula_of(found), *drafter.parts(found), settings)
+        found, bound = _exactly(drafter, structure_of(pairs), None if start is None else draft_of(start))
+        return Fit.of(formula_of(found), *drafter.parts(found), settings, bound)
     return _fit_by_swarm(data, prior, space, pairs, settings, search, rng, start)
+
+
+def _exactly(drafter: Drafter, structure: DraftStructure, start: Draft | None) -> tuple[Draft, float | None]:
+    """The best formula found, and a bound on J over all of them where it is cheap or asked for."""
+    found = fit_jointly(drafter, structure, start)
+    assert found is not None  # there is room for the structure
+    seconds = drafter.settings.certificate
+    if len(structure) == len(structure[0]) == 1 and not drafter.interrupted:
+        alone = drafter.place(found, structure, 0, 0)
+        if alone is not None:
+            better = ((alone.primitive,),)
+            return max(found, better, key=drafter.value), max(alone.bound, drafter.value(found))
+    if seconds == 0 or drafter.interrupted:
+        return found, None
+    known = certify(drafter, structure, found, seconds)
+    return known.draft, known.bound
 
 
 def _fit_by_swarm(
