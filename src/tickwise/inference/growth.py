@@ -41,7 +41,7 @@ def infer_jointly(
         limits: The limits of each exact search.
 
     Returns:
-        The formula and what it is worth.
+        The formula and what it is worth. Ctrl-C, once there is a formula, leaves out the searches that are left.
 
     Raises:
         DataError: If a label is missing, or no formula tells the labels apart better than a trivial one.
@@ -52,6 +52,8 @@ def infer_jointly(
     drafter = Drafter(data, weights, prior, space, settings.information_weight, cost, limits)
     found = grow_jointly(drafter, settings.size, settings.rate)
     if not found:
+        if drafter.interrupted:
+            raise KeyboardInterrupt
         raise DataError(
             "no formula tells the labels apart better than a trivial one; use other variables or a finer space"
         )
@@ -83,7 +85,7 @@ def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:
         (1.0 / emphasis(drafter), drafter.trivial),
     ):
         found = rough.place(_ALONE, ((FREE,),), 0, 0, positives=weight, least=least)
-        if found is None or drafter.interrupted:
+        if found is None:
             continue
         grown = _grown(drafter, rough, ((found.primitive,),), size, rate)
         best = [max(pair, key=drafter.value) for pair in zip(best, grown, strict=False)] or grown
