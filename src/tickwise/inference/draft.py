@@ -170,11 +170,16 @@ class Drafter:
         return self.rate(draft), 0.0 if math.isinf(logarithm) else -logarithm / self.prior.horizon + 0.0
 
     @cached_property
+    def alike(self) -> float:
+        """The classification rate of the best formula that classifies all trajectories alike."""
+        good = float(self.weights[self.data.labels == 1].sum() / self.weights.sum())
+        return max(good, 1.0 - good)
+
+    @cached_property
     def trivial(self) -> float:
         """What a formula has to be worth at least to be better than one that classifies all trajectories alike."""
-        good = float(self.weights[self.data.labels == 1].sum() / self.weights.sum())
         most = self.prior.arrays(self.data.variables).most
-        return max(good, 1.0 - good) + TIE + (self.information_weight * most if math.isfinite(most) else 0.0)
+        return self.alike + TIE + (self.information_weight * most if math.isfinite(most) else 0.0)
 
     def satisfied(self, draft: Draft) -> NDArray[np.bool_]:
         """Whether each trajectory satisfies a draft, empty places left out (the weak view), shape ``(n,)``."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from tickwise.errors import DataError
 from tickwise.inference.beginnings import COARSE, Bar, climb, completed, emphasis, retimed
 from tickwise.inference.draft import FREE, Draft, Drafter, Structure, coarser, formula_of
-from tickwise.inference.exact import ExactSettings
+from tickwise.inference.exact import TIE, ExactSettings
 from tickwise.inference.fit import Fit
 from tickwise.inference.objective import trajectory_weights
 from tickwise.inference.prior import Prior
@@ -51,9 +52,9 @@ def infer_jointly(
     cost = settings.nesting_penalty(len(data), prior.horizon)
     drafter = Drafter(data, weights, prior, space, settings.information_weight, cost, limits)
     found = grow_jointly(drafter, settings.size, settings.rate)
-    if not found:
-        if drafter.interrupted:
-            raise KeyboardInterrupt
+    if drafter.interrupted and not found:
+        raise KeyboardInterrupt
+    if not found or drafter.rate(found[-1]) <= drafter.alike + TIE:
         raise DataError(
             "no formula tells the labels apart better than a trivial one; use other variables or a finer space"
         )
@@ -88,10 +89,19 @@ def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:
         if found is None:
             continue
         grown = _grown(drafter, rough, ((found.primitive,),), size, rate)
-        best = [max(pair, key=drafter.value) for pair in zip(best, grown, strict=False)] or grown
-        if drafter.rate(grown[-1]) >= rate:
-            return grown
+        best = [_better(drafter, rate, pair) for pair in itertools.zip_longest(best, grown)]
+        enough = next((count for count, draft in enumerate(best, 1) if drafter.rate(draft) >= rate), None)
+        if enough is not None:
+            best, size = best[:enough], enough - 1  # from here on only smaller ones are looked for
+            if size < 2:
+                break
     return best
+
+
+def _better(drafter: Drafter, rate: float, drafts: Iterable[Draft | None]) -> Draft:
+    """The best of some drafts, those with the rate first."""
+    known = (draft for draft in drafts if draft is not None)
+    return max(known, key=lambda draft: (drafter.rate(draft) >= rate, drafter.value(draft)))
 
 
 def _grown(drafter: Drafter, rough: Drafter, seed: Draft, size: int, rate: float) -> list[Draft]:
