@@ -33,9 +33,12 @@ def drafter_of(data, prior, space, weight=0.01, class_weight=None, **limits) -> 
 
 
 def every_draft(drafter: Drafter, structure: Structure) -> Iterator[Draft]:
-    """All formulas of a structure of two primitives."""
+    """All formulas of a structure of one or two primitives."""
     places = [(i, choice) for i, row in enumerate(structure) for choice in row]
     rows = [list(every_primitive(drafter, choice)) for _, choice in places]
+    if len(rows) == 1:
+        yield from (((primitive,),) for primitive in rows[0])
+        return
     for first, second in itertools.product(*rows):
         if places[0][0] != places[1][0]:
             yield ((first,), (second,))

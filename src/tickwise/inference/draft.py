@@ -83,6 +83,13 @@ def formula_of(draft: Draft) -> SDNF:
     return SDNF(tuple(SequentialConjunction(row) for row in rows if row))
 
 
+@dataclass(slots=True)
+class Interruption:
+    """Whether Ctrl-C has ended a search; one for all that work on the same formula."""
+
+    happened: bool = False
+
+
 @dataclass(eq=False)
 class Drafter:
     """Fills and improves the places of drafts.
@@ -95,7 +102,7 @@ class Drafter:
         information_weight: λ.
         nesting_cost: What each nested operator costs where operators are free, in units of J.
         settings: The limits of each exact search.
-        interrupted: Whether Ctrl-C has ended a search: then all that follow are left out.
+        interruption: Whether Ctrl-C has ended a search: then all that follow are left out.
     """
 
     data: LabelledTrajectories
@@ -105,8 +112,13 @@ class Drafter:
     information_weight: float
     nesting_cost: float
     settings: ExactSettings
-    interrupted: bool = False
+    interruption: Interruption = field(default_factory=Interruption)
     _signatures: dict[Primitive, NDArray[np.bool_]] = field(default_factory=dict, repr=False)
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C has ended a search."""
+        return self.interruption.happened
 
     @cached_property
     def levels(self) -> Levels:
@@ -133,7 +145,8 @@ class Drafter:
         weights = np.where(self.data.labels == 1, 1.0, negatives)[mask] * self.weights[mask]
         share = float(self.weights.sum() / weights.sum())
         weight, cost = self.information_weight * share, self.nesting_cost * share
-        return Drafter(self.data.select(mask), weights, self.prior, self.space, weight, cost, self.settings)
+        part = self.data.select(mask)
+        return Drafter(part, weights, self.prior, self.space, weight, cost, self.settings, self.interruption)
 
     def signature(self, primitive: Primitive) -> NDArray[np.bool_]:
         """Whether each trajectory satisfies a primitive (the weak view), shape ``(n,)``."""
@@ -156,11 +169,16 @@ class Drafter:
         return self.rate(draft), 0.0 if math.isinf(logarithm) else -logarithm / self.prior.horizon + 0.0
 
     @cached_property
+    def alike(self) -> float:
+        """The classification rate of the best formula that classifies all trajectories alike."""
+        good = float(self.weights[self.data.labels == 1].sum() / self.weights.sum())
+        return max(good, 1.0 - good)
+
+    @cached_property
     def trivial(self) -> float:
         """What a formula has to be worth at least to be better than one that classifies all trajectories alike."""
-        good = float(self.weights[self.data.labels == 1].sum() / self.weights.sum())
         most = self.prior.arrays(self.data.variables).most
-        return max(good, 1.0 - good) + TIE + (self.information_weight * most if math.isfinite(most) else 0.0)
+        return self.alike + TIE + (self.information_weight * most if math.isfinite(most) else 0.0)
 
     def satisfied(self, draft: Draft) -> NDArray[np.bool_]:
         """Whether each trajectory satisfies a draft, empty places left out (the weak view), shape ``(n,)``."""
@@ -194,7 +212,8 @@ class Drafter:
             least: The least `value` of the draft with it.
 
         Returns:
-            What the exact search found; None if there is no room, or nothing that is worth so much.
+            What the exact search found; None if there is no room, or nothing that is worth so much, or Ctrl-C came
+            before there was anything.
         """
         choice = structure[i][j]
         gap = self._gap(draft, structure, i, j)
@@ -218,8 +237,12 @@ class Drafter:
         problem = ExactProblem(
             coded, self.levels, self.prior, (gap,), worth, choice.kinds, self._slot(draft, i, j), self.supported
         )
-        found = improve(problem, self.settings, least + self.cost(filled(draft, i, j, None)))
-        self.interrupted = self.interrupted or (found is not None and found.interrupted)
+        try:
+            found = improve(problem, self.settings, least + self.cost(filled(draft, i, j, None)))
+        except KeyboardInterrupt:
+            self.interruption.happened = True
+            return None
+        self.interruption.happened = found is not None and found.interrupted
         return found
 
     def ascend(self, draft: Draft, structure: Structure) -> tuple[Draft, float]:

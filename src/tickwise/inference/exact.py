@@ -204,7 +204,8 @@ def improve(problem: ExactProblem, settings: ExactSettings, least: float) -> Exa
         least: The least worth, in units of J.
 
     Returns:
-        The best primitive; None if none is worth so much, or none was found within the limits.
+        The best primitive; None if none is worth so much, or none was found within the limits. Ctrl-C ends the search
+        with the best so far, once there is one.
     """
     return _Search(problem, settings, least).run()
 
@@ -296,7 +297,7 @@ class _Search:
                 else:
                     bound = -math.inf
             except KeyboardInterrupt:
-                if not self._started:
+                if self.best.node is None:
                     raise
                 interrupted = True
         return None if self.best.node is None else self._result(max(bound, self.best.value), interrupted)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 from tickwise.errors import DataError
@@ -43,7 +43,7 @@ def infer_jointly(
         limits: The limits of each exact search.
 
     Returns:
-        The formula and what it is worth.
+        The formula and what it is worth. Ctrl-C, once there is a formula, leaves out the searches that are left.
 
     Raises:
         DataError: If a label is missing, or no formula tells the labels apart better than a trivial one.
@@ -53,7 +53,9 @@ def infer_jointly(
     cost = settings.nesting_penalty(len(data), prior.horizon)
     drafter = Drafter(data, weights, prior, space, settings.information_weight, cost, limits)
     found = grow_jointly(drafter, settings.size, settings.rate)
-    if not found:
+    if drafter.interrupted and not found:
+        raise KeyboardInterrupt
+    if not found or drafter.rate(found[-1]) <= drafter.alike + TIE:
         raise DataError(
             "no formula tells the labels apart better than a trivial one; use other variables or a finer space"
         )
@@ -86,15 +88,24 @@ def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:
         (1.0 / emphasis(drafter), drafter.trivial),
     ):
         found = rough.place(_ALONE, ((FREE,),), 0, 0, positives=weight, least=least)
-        if found is None or drafter.interrupted:
+        if found is None:
             continue
         grown = _grown(drafter, rough, ((found.primitive,),), size, rate)
-        pairs = itertools.zip_longest(best, grown)
-        best = [max((draft for draft in pair if draft), key=drafter.value) for pair in pairs]
-        if drafter.rate(grown[-1]) >= rate:
-            return grown
+        best = [_better(drafter, rate, pair) for pair in itertools.zip_longest(best, grown)]
+        enough = next((count for count, draft in enumerate(best, 1) if drafter.rate(draft) >= rate), None)
+        if enough is not None:
+            best, size = best[:enough], enough - 1  # from here on only smaller ones are looked for
+            if size < 2:
+                return best
     values = [drafter.value(draft) for draft in best]
-    return best[: 1 + next(k for k, value in enumerate(values) if value >= max(values) - TIE)] if best else []
+    known = best and drafter.rate(best[-1]) >= rate
+    return best if known else best[: 1 + next((k for k, v in enumerate(values) if v >= max(values) - TIE), 0)]
+
+
+def _better(drafter: Drafter, rate: float, drafts: Iterable[Draft | None]) -> Draft:
+    """The best of some drafts, those with the rate first."""
+    known = (draft for draft in drafts if draft is not None)
+    return max(known, key=lambda draft: (drafter.rate(draft) >= rate, drafter.value(draft)))
 
 
 def _grown(drafter: Drafter, rough: Drafter, seed: Draft, size: int, rate: float) -> list[Draft]:

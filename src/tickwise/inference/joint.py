@@ -26,13 +26,16 @@ def fit_jointly(drafter: Drafter, structure: Structure, start: Draft | None = No
         start: Disjuncts that are a good guess for the first ones.
 
     Returns:
-        The formula; None if there is no room for the structure.
+        The formula; None if there is no room for the structure. Ctrl-C, once there is a formula, leaves out the
+        searches that are left.
     """
     rough = coarser(drafter, COARSE)
     begun = list(_conjunctions(rough, structure[0]) if len(structure) == 1 else _coverings(rough, structure, ()))
     if start is not None and len(start) <= len(structure):
         begun += _coverings(rough, structure, start)
     found = climb(drafter, [(draft, structure) for draft in begun])
+    if drafter.interrupted and not found:
+        raise KeyboardInterrupt
     return found[0][1] if found else None
 
 

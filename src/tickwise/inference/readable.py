@@ -16,6 +16,8 @@ from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.sdnf import SDNF, Primitive, SequentialConjunction
 from tickwise.logic.syntax import Box, Not
 
+_OTHER = {"lower": "upper", "upper": "lower"}
+
 
 def readable(formula: SDNF, data: LabelledTrajectories, space: SearchSpace) -> SDNF:
     """The formula with the shortest decimals as sides of its boxes, where they may be any number.
@@ -54,7 +56,7 @@ def _readable(primitive: Primitive, data: LabelledTrajectories, ranges: Mapping[
                 continue
             inner, outer = _room(primitive, data, verdicts, (bound.variable, side), values, number)
             low, high = (inner, outer) if outward > 0 else (outer, inner)
-            other = _side(primitive, bound.variable, "lower" if outward > 0 else "upper")
+            other = _side(primitive, bound.variable, _OTHER[side])
             first, last = ranges[bound.variable]
             low, high = (max(low, other), min(high, last)) if outward > 0 else (max(low, first), min(high, other))
             if low < high:
@@ -76,15 +78,17 @@ def _room(
     """
     sign = -1.0 if place[1] == "lower" else 1.0
     ordered = np.sort(sign * values)  # outward
-    at = int(np.searchsorted(ordered, sign * number, side="right"))  # the values inside
+    strict = [_strict(primitive, place[0], side) for side in (place[1], _OTHER[place[1]])]
+    at = int(np.searchsorted(ordered, sign * number, side="left" if strict[0] else "right"))  # the values inside
 
     def same(count: int) -> bool:
         """Whether the verdicts are the same with so many of the values inside."""
         edge = ordered[count - 1] if count else np.nextafter(ordered[0], -np.inf)
         return bool((_verdicts(_with_side(primitive, *place, sign * edge), data) == verdicts).all())
 
-    other = _side(primitive, place[0], "upper" if place[1] == "lower" else "lower")
-    low = 0 if math.isinf(other) else int(np.searchsorted(ordered, sign * other)) + 1  # beyond it the box is reversed
+    other, low = _side(primitive, place[0], _OTHER[place[1]]), 0
+    if math.isfinite(other):  # beyond it the box is reversed
+        low = int(np.searchsorted(ordered, sign * other, side="right" if strict[1] else "left")) + 1
     if low > at:
         return number, number
     least = _first(same, low, at)
@@ -105,6 +109,11 @@ def _first(good: Callable[[int], bool], low: int, high: int) -> int:
 def _verdicts(primitive: Primitive, data: LabelledTrajectories) -> NDArray[np.int8]:
     found = primitive.formula.verdict(data.values, variables=data.variables, lengths=data.lengths)
     return np.asarray(found)
+
+
+def _strict(primitive: Primitive, variable: str, side: str) -> bool:
+    bound = next(bound for bound in primitive.box.bounds if bound.variable == variable)
+    return bound.lower_strict if side == "lower" else bound.upper_strict
 
 
 def _side(primitive: Primitive, variable: str, side: str) -> float:

@@ -108,18 +108,26 @@ def fit_structure(
 
 def _exactly(drafter: Drafter, structure: DraftStructure, start: Draft | None) -> tuple[Draft, float | None]:
     """The best formula found, and a bound on J over all of them where it is cheap or asked for."""
+    if len(structure) == len(structure[0]) == 1:
+        return _alone(drafter, structure, start)
     found = fit_jointly(drafter, structure, start)
     assert found is not None  # there is room for the structure
-    seconds = drafter.settings.certificate
-    if len(structure) == len(structure[0]) == 1 and not drafter.interrupted:
-        alone = drafter.place(found, structure, 0, 0)
-        if alone is not None:
-            better = ((alone.primitive,),)
-            return max(found, better, key=drafter.value), max(alone.bound, drafter.value(found))
-    if seconds == 0 or drafter.interrupted:
+    if drafter.settings.certificate == 0 or drafter.interrupted:
         return found, None
-    known = certify(drafter, structure, found, seconds)
+    known = certify(drafter, structure, found, drafter.settings.certificate)
     return known.draft, known.bound
+
+
+def _alone(drafter: Drafter, structure: DraftStructure, start: Draft | None) -> tuple[Draft, float]:
+    """The best primitive, and the bound that proves it."""
+    found = drafter.place(((None,),), structure, 0, 0)
+    if found is None:
+        raise KeyboardInterrupt
+    known: list[Draft] = [((found.primitive,),)]
+    if start is not None and len(start) == len(start[0]) == 1:  # its sides need not be among the levels
+        known.append(start)
+    best = max(known, key=drafter.value)
+    return best, max(found.bound, drafter.value(best))
 
 
 def _fit_by_swarm(
