@@ -3,9 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.inference.test_exact import Interrupter
 from tests.inference.worlds import errand_data, grid_prior, ragged_walks, verdicts, weakly
 from tests.strategies import sdnfs
 from tickwise.errors import ConfigurationError, DataError
+from tickwise.inference.bounding import Bounds
+from tickwise.inference.exact import ExactSettings
 from tickwise.inference.information import information_gain
 from tickwise.inference.objective import Objective
 from tickwise.inference.prior import BoxPrior
@@ -284,3 +287,48 @@ def test_pruning_keeps_a_formula_satisfying_and_leaves_no_disjunct_to_spare(rule
     assert is_satisfying(found, data, constraints) == is_satisfying(rule, data, constraints)
     if is_satisfying(found, data, constraints) and found != rule:
         assert found.size < rule.size
+
+
+def test_an_exact_tree_proves_every_node():
+    settings = InferenceSettings(depth=2, rate=1.0)
+    tree = infer_tree(SMALL, SMALL_PRIOR, SMALL_SPACE, settings, ExactSettings(), np.random.default_rng(0))
+    swarm = infer_tree(SMALL, SMALL_PRIOR, SMALL_SPACE, settings, SwarmSettings(), np.random.default_rng(0))
+    assert [node.gap for node in tree.nodes() if not node.leaf] == [0] * sum(not node.leaf for node in tree.nodes())
+    assert all(node.gap is None for node in (*swarm.nodes(), *(node for node in tree.nodes() if node.leaf)))
+    nested = tree.primitive.operator.nested, swarm.primitive.operator.nested
+    cost = settings.nesting_penalty(len(SMALL), SMALL_PRIOR.horizon)
+    assert tree.objective - cost * nested[0] >= swarm.objective - cost * nested[1] - 1e-12
+    again = infer_tree(SMALL, SMALL_PRIOR, SMALL_SPACE, settings, ExactSettings(), np.random.default_rng(1))
+    assert again == tree  # nothing is drawn
+
+
+def test_an_exact_search_that_is_stopped_leaves_a_gap():
+    rng = np.random.default_rng(3)
+    labels = np.where(rng.random(len(SMALL)) < 0.5, 1, -1)
+    noise = LabelledTrajectories(SMALL.values, SMALL.lengths, labels, SMALL.variables, SMALL.ids)
+    settings, none = InferenceSettings(depth=1, rate=1.0), np.random.default_rng(0)
+    stopped = infer_tree(noise, SMALL_PRIOR, SMALL_SPACE, settings, ExactSettings(nodes=1), none)
+    best = infer_tree(noise, SMALL_PRIOR, SMALL_SPACE, settings, ExactSettings(), none)
+    assert best.gap == 0
+    cost = settings.nesting_penalty(len(noise), SMALL_PRIOR.horizon)
+    missed = best.objective - stopped.objective
+    missed -= cost * (best.primitive.operator.nested - stopped.primitive.operator.nested)
+    assert stopped.gap > 0
+    assert stopped.gap >= missed - 1e-12
+
+
+@pytest.mark.parametrize("call", [1, 2, 3, 6])
+def test_ctrl_c_ends_an_exact_tree_with_leaves(monkeypatch, call):
+    interrupter = Interrupter(call)
+    monkeypatch.setattr(Bounds, "__call__", lambda bounds, nodes: interrupter(bounds, nodes))
+    settings, rng = InferenceSettings(depth=3, rate=1.0, class_weight="balanced"), np.random.default_rng(0)
+    if call == 1:
+        with pytest.raises(KeyboardInterrupt):
+            infer_tree(SMALL, SMALL_PRIOR, SMALL_SPACE, settings, ExactSettings(), rng)
+        return
+    tree = infer_tree(SMALL, SMALL_PRIOR, SMALL_SPACE, settings, ExactSettings(), rng)
+    assert interrupter.left == 0
+    assert tree.gap > 0
+    assert {child.stop for child in (tree.left, tree.right)} <= {"interrupted", "I"}
+    assert "interrupted" in {child.stop for child in (tree.left, tree.right)}
+    assert all(child.leaf for child in (tree.left, tree.right))
