@@ -106,17 +106,6 @@ def test_a_place_gets_the_best_of_all_primitives(drafter, structure, seed, data)
     assert values[found.primitive] == pytest.approx(best, abs=TIE)
     assert drafter.place(draft, structure, i, j, least=best - 1e-9).primitive == found.primitive
     assert drafter.place(draft, structure, i, j, least=best + 1e-9) is None
-    # ticks and the box may be given
-    first, last = data.draw(st.integers(0, 2)), data.draw(st.integers(3, 6))
-    some = next(primitive for row in draft for primitive in row)
-    node = drafter.node(some)
-    kept = [value for p, value in values.items() if p.start >= first and p.end <= last and p.box == some.box]
-    within = drafter.place(draft, structure, i, j, within=(first, last), box=node)
-    assert (within is None) == (not kept)
-    if kept:
-        assert within.primitive.box == some.box
-        assert first <= within.primitive.start < within.primitive.end <= last
-        assert within.value - held == pytest.approx(max(kept), abs=TIE)
 
 
 @settings(max_examples=40)

@@ -16,7 +16,7 @@ COARSE = 10
 _CUTS = 8  # parts of the first primitive's window, at the ends of which it may end, or start, too
 _KEEP = 4.0  # while places are empty, an average positive trajectory counts as much as so many negative ones
 _NEARLY = 0.98  # as much better than a trivial formula as the best beginning so far
-_CLIMBED = 4  # beginnings that are improved, of all those of one size
+_CLIMBED = 8  # beginnings that are improved, of all those of one size
 
 Scored = tuple[float, Draft]
 
@@ -45,13 +45,13 @@ def emphasis(drafter: Drafter) -> float:
 
 
 def climb(drafter: Drafter, begun: Iterable[tuple[Draft, Structure]]) -> list[Scored]:
-    """Ascend from the best beginnings, up to one that makes no error; the best formula first."""
+    """Ascend from the best beginnings, up to one that cannot be better; the best formula first."""
     ranked = sorted(dict.fromkeys(begun), key=lambda pair: -drafter.value(pair[0]))
     peaks: dict[Draft, float] = {}
     for draft, structure in ranked[:_CLIMBED]:
         peak, value = drafter.ascend(draft, structure)
         peaks.setdefault(peak, value)
-        if drafter.rate(peak) >= 1.0 - TIE:
+        if drafter.information_weight == 0 and drafter.rate(peak) >= 1.0 - TIE:
             break
     return sorted(((value, draft) for draft, value in peaks.items()), key=lambda pair: -pair[0])
 

@@ -7,6 +7,7 @@ changed for the better. `certificate` bounds how much better a formula can be of
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -56,10 +57,14 @@ def _conjunctions(drafter: Drafter, row: tuple[Choice, ...]) -> Iterator[Draft]:
 
 def _firsts(drafter: Drafter, structure: Structure, draft: Draft, j: int) -> Iterator[Draft]:
     """The first primitive of a conjunction in place j."""
-    alone = len(structure[0]) == 1
-    found = drafter.place(draft, structure, 0, j, positives=1.0 if alone else emphasis(drafter))
-    if found is not None:
-        yield from retimed(filled(draft, 0, j, found.primitive), j)
+    if len(structure[0]) == 1:
+        weights = [(1.0, -math.inf)]
+    else:
+        weights = [(emphasis(drafter), -math.inf), (1.0, drafter.trivial)]
+    for weight, least in weights:
+        found = drafter.place(draft, structure, 0, j, positives=weight, least=least)
+        if found is not None:
+            yield from retimed(filled(draft, 0, j, found.primitive), j)
 
 
 def _coverings(drafter: Drafter, structure: Structure, known: Draft) -> Iterator[Draft]:
