@@ -192,10 +192,8 @@ def coding(count: int) -> None:
     before = peak()
     coded = code_parts(parts(), levels, TICKS)
     held = sum(array.nbytes for array in coded)
-    print(f"coding {count:,} trajectories in parts of {PART:,}, states of {(TICKS + 1) * 2 * 8} bytes a trajectory:")
-    print(
-        f"{held / count:.0f} bytes a trajectory, {held / 2**20:.0f} MiB; peak {peak():.0f} MiB, {before:.0f} with one part"
-    )
+    print(f"coding {count:,} trajectories in parts of {PART:,}: states of {(TICKS + 1) * 16} bytes each,")
+    print(f"{held / count:.0f} bytes coded, {held / 2**20:.0f} MiB; peak {peak():.0f} MiB, {before:.0f} for one part")
 
 
 def peak() -> float:

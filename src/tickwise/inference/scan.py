@@ -62,15 +62,24 @@ def _next(row: NDArray[np.uint64], tick: int, flip: np.uint64) -> int:
 
 @njit
 def _signal(
-    coded: Coded, i: int, existential: bool, complemented: bool, sides: NDArray[np.int64], row: NDArray[np.uint64]
+    at_least: NDArray[np.uint64],
+    at_most: NDArray[np.uint64],
+    alive: NDArray[np.uint64],
+    i: int,
+    existential: bool,
+    complemented: bool,
+    sides: NDArray[np.int64],
+    row: NDArray[np.uint64],
 ) -> None:
     """The ticks of a trajectory at which a predicate holds, or for □ and □◇ is violated.
 
     What comes after its last tick is UNKNOWN: there ◇ may still be satisfied, and □ is not violated (the weak view).
 
     Args:
-        coded: The trajectories.
-        i: Which one.
+        at_least: As in `Coded`, which would cost more to hand over than what is done here.
+        at_most: Likewise.
+        alive: Likewise.
+        i: Which trajectory.
         existential: Whether the operator is ◇ or ◇□.
         complemented: Whether the predicate is the complement of the box.
         sides: The level of each lower side, then of each upper side, shape ``(2 * variables,)``.
@@ -83,14 +92,14 @@ def _signal(
     for word in range(len(row)):
         bits = np.uint64(0)
         if not empty:
-            bits = coded.alive[i, word]
+            bits = alive[i, word]
             for variable in range(width):
-                bits &= coded.at_least[variable, sides[variable], i, word]
-                bits &= coded.at_most[variable, sides[width + variable], i, word]
+                bits &= at_least[variable, sides[variable], i, word]
+                bits &= at_most[variable, sides[width + variable], i, word]
         if existential == complemented:
-            bits = ~bits if existential else coded.alive[i, word] & ~bits
+            bits = ~bits if existential else alive[i, word] & ~bits
         elif existential:
-            bits |= ~coded.alive[i, word]
+            bits |= ~alive[i, word]
         row[word] = bits
 
 
@@ -132,12 +141,15 @@ def tabulate(
     existential, complemented = node[EXISTENTIAL] == 1, node[COMPLEMENTED] == 1
     # a violation is rightly called, and so is a satisfaction: `sign` turns the one count into the other
     right, sign = 0.0, -1.0 if existential else 1.0
-    for i in range(len(coded.positive)):
-        positive = coded.positive[i]
-        weight = coded.weights[i] if positive else -coded.weights[i]
+    at_least, at_most, alive, labels, weights = coded
+    for i in range(len(labels)):
+        positive = labels[i]
+        weight = weights[i] if positive else -weights[i]
         if positive == existential:
-            right += coded.weights[i]
-        _signal(coded, i, existential, complemented, outer if positive != complemented else inner, row)
+            right += weights[i]
+        _signal(
+            at_least, at_most, alive, i, existential, complemented, outer if positive != complemented else inner, row
+        )
         _add_gaps(row, first, last, sign * weight, begins, ends, view, never)
     _sum_up(view, right, never)
     return view
@@ -344,10 +356,11 @@ def signature(
     coded: Coded, existential: bool, complemented: bool, sides: NDArray[np.int64], times: NDArray[np.int64]
 ) -> NDArray[np.bool_]:
     """Whether each trajectory satisfies a primitive, by the weak view, shape ``(n,)``."""
-    row = np.empty(coded.alive.shape[1], dtype=np.uint64)
-    result = np.empty(len(coded.positive), dtype=np.bool_)
+    at_least, at_most, alive, labels, _ = coded
+    row = np.empty(alive.shape[1], dtype=np.uint64)
+    result = np.empty(len(labels), dtype=np.bool_)
     for i in range(len(result)):
-        _signal(coded, i, existential, complemented, sides, row)
+        _signal(at_least, at_most, alive, i, existential, complemented, sides, row)
         result[i] = _begins(row, times) == existential
     return result
 
@@ -357,12 +370,13 @@ def weigh(
     coded: Coded, existential: bool, complemented: bool, sides: NDArray[np.int64], times: NDArray[np.int64]
 ) -> float:
     """The weight of the trajectories that a primitive classifies rightly."""
-    row = np.empty(coded.alive.shape[1], dtype=np.uint64)
+    at_least, at_most, alive, labels, weights = coded
+    row = np.empty(alive.shape[1], dtype=np.uint64)
     right = 0.0
-    for i in range(len(coded.positive)):
-        _signal(coded, i, existential, complemented, sides, row)
-        if (_begins(row, times) == existential) == coded.positive[i]:
-            right += coded.weights[i]
+    for i in range(len(labels)):
+        _signal(at_least, at_most, alive, i, existential, complemented, sides, row)
+        if (_begins(row, times) == existential) == labels[i]:
+            right += weights[i]
     return right
 
 
