@@ -1,35 +1,28 @@
-"""Seconds of an exact search of one primitive, beside the swarm and a scan of everything.
+"""The best primitive of a node of Algorithm 1, beside the swarm and a scan of everything, and how its search grows.
 
-    python benchmarks/exact_search.py [--quick]
-
-A node of Algorithm 1 on Case Study 1: real collections of Q-learning, 9×9 cells, 40 ticks, all four operators and both
-polarities, with the information gain, on one core. Then how the search grows with the number of trajectories and with
-the world, and what memory 100,000 trajectories take that are coded in parts. Times are medians of processor seconds;
-what is compiled is compiled before. The scan looks at every box with the compiled tables of all windows and durations,
-but bounds nothing; it leaves the information gain out.
+The node is the root of Case Study 1: real collections of Q-learning, 9×9 cells, 40 ticks, all four operators and both
+polarities, with the information gain. The scan looks at every box with the compiled tables of windows and durations,
+but bounds nothing; it leaves the information gain out. Neither may find more than the exact search. The search then
+grows with the number of trajectories, and with the world for 1,000 trajectories.
 """
 
 from __future__ import annotations
 
-import argparse
-import os
-import statistics
-import subprocess
-import sys
-import time
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+import functools
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from benchmarks.contest import Contender, Turn, contest
+from benchmarks.result import OURS, Result
 from tickwise.envs.catalog import CASE_STUDY_1_SOURCE
 from tickwise.envs.gridworld import GridWorld
 from tickwise.experiments.case_studies import CASE_STUDY_1
 from tickwise.inference.boxes import root, single, split
-from tickwise.inference.exact import KINDS, ExactProblem, ExactResult, ExactSettings, exact_search, worth_of
+from tickwise.inference.exact import KINDS, ExactProblem, ExactSettings, exact_search, worth_of
 from tickwise.inference.gains import gain_bound
-from tickwise.inference.levels import Levels, code, code_parts
+from tickwise.inference.levels import Levels, code
 from tickwise.inference.objective import Objective
 from tickwise.inference.prior import PathPrior
 from tickwise.inference.scan import bound_all
@@ -43,17 +36,8 @@ from tickwise.rl.states import tau_memory
 
 TICKS = 40
 WEIGHT = CASE_STUDY_1.inference.information_weight
-PART = 10_000
-
-
-@dataclass(frozen=True)
-class Row:
-    """One measurement; ``size`` counts trajectories, or cells along a side of the world."""
-
-    benchmark: str
-    size: int
-    contender: str
-    seconds: float
+TRAJECTORIES = (100, 1_000, 10_000, 100_000)
+WORLDS = (9, 15, 25, 50)
 
 
 def prior_of(world: GridWorld) -> PathPrior:
@@ -96,9 +80,9 @@ def problem_of(data: LabelledTrajectories, prior: PathPrior, space: SearchSpace)
     return ExactProblem(coded, levels, prior, space.gaps(), worth_of(coded, WEIGHT))
 
 
-def run_exact(data: LabelledTrajectories, prior: PathPrior, space: SearchSpace) -> ExactResult:
+def run_exact(data: LabelledTrajectories, prior: PathPrior, space: SearchSpace) -> float:
     """The exact search, coding included."""
-    return exact_search(problem_of(data, prior, space), ExactSettings())
+    return exact_search(problem_of(data, prior, space), ExactSettings()).value
 
 
 def run_swarm(data: LabelledTrajectories, prior: PathPrior, space: SearchSpace) -> float:
@@ -128,96 +112,47 @@ def run_scan(data: LabelledTrajectories, prior: PathPrior, space: SearchSpace) -
     return float(bound_all(problem.coded, np.array(boxes), gaps, worth, limits, TICKS + 1).max())
 
 
-Contender = Callable[[LabelledTrajectories, PathPrior, SearchSpace], object]
-CONTENDERS: dict[str, Contender] = {"exact": run_exact, "swarm": run_swarm, "scan": run_scan}
+Search = Callable[[LabelledTrajectories, PathPrior, SearchSpace], float]
+SEARCHES: dict[str, Search] = {OURS: run_exact, "swarm": run_swarm, "scan": run_scan}
 
 
-def seconds(work: Callable[[], object]) -> float:
-    begin = time.process_time()
-    work()
-    return time.process_time() - begin
-
-
-def one_node(quick: bool) -> Iterator[Row]:
-    """Contenders in turn, on several collections."""
-    world = CASE_STUDY_1_SOURCE.world
+def searching(search: Search, data: list[LabelledTrajectories], world: GridWorld) -> Turn:
+    """One search of each data set; what is compiled is compiled before."""
     prior, space = prior_of(world), SearchSpace.grid(world.size, TICKS)
-    data = [collection(seed) for seed in range(3 if quick else 9)]
-    for run in CONTENDERS.values():
-        run(data[0].select(np.arange(-20, 20)), prior, space)  # compiles
-    times: dict[str, list[float]] = {name: [] for name in CONTENDERS}
-    for each in data:
-        for name, run in CONTENDERS.items():
-            repeats = 1 if quick or name == "swarm" else 3
-            times[name].append(min(seconds(lambda run=run, each=each: run(each, prior, space)) for _ in range(repeats)))
-    size = round(statistics.median(map(len, data)))
-    for name in CONTENDERS:
-        yield Row("one node of Case Study 1", size, name, statistics.median(times[name]))
+    small = walks(np.random.default_rng(0), world, 50)
+    search(small, prior, space)
+    return lambda: [search(each, prior, space) for each in data]
 
 
-def growth(quick: bool) -> Iterator[Row]:
-    """More trajectories, and larger worlds."""
-    world = GridWorld(9)
-    prior, space = prior_of(world), SearchSpace.grid(9, TICKS)
-    for count in (100, 1_000, 10_000) if quick else (100, 1_000, 10_000, 100_000):
-        data = walks(np.random.default_rng(1), world, count)
-        yield Row("trajectories, 9×9", count, "exact", seconds(lambda data=data: run_exact(data, prior, space)))
-    for size in (9, 15) if quick else (9, 15, 20, 30):
-        world = GridWorld(size)
-        data, prior, space = (
-            walks(np.random.default_rng(1), world, 1_000),
-            prior_of(world),
-            SearchSpace.grid(size, TICKS),
+def none_better(exact: list[float], others: list[float]) -> bool:
+    """Whether the exact search found the most."""
+    return all(one >= other - 1e-9 for one, other in zip(exact, others, strict=True))
+
+
+def contenders(
+    names: tuple[str, ...], data: list[LabelledTrajectories], world: GridWorld, most: int
+) -> list[Contender]:
+    """Those of these names; the swarm is slow and searches once."""
+    return [
+        Contender(
+            name, functools.partial(searching, SEARCHES[name], data, world), len(data), 1 if name == "swarm" else most,
+            warm=False,
         )
-        work = lambda data=data, prior=prior, space=space: run_exact(data, prior, space)  # noqa: E731
-        yield Row("cells along a side, 1,000 trajectories", size, "exact", seconds(work))
+        for name in names
+    ]  # fmt: skip
 
 
-def measure(quick: bool) -> list[Row]:
-    """All rows of seconds; ``quick`` takes fewer and smaller ones."""
-    return [*one_node(quick), *growth(quick)]
-
-
-def coding(count: int) -> None:
-    """Code trajectories that come in parts, and print how much memory that took; for a process of its own."""
-    world, rng = GridWorld(9), np.random.default_rng(1)
-    levels = Levels.of(SearchSpace.grid(9, TICKS), walks(rng, world, 2), 32)
-
-    def parts() -> Iterator[tuple[LabelledTrajectories, NDArray[np.float64]]]:
-        for _ in range(count // PART):
-            yield walks(rng, world, PART), np.ones(PART)
-
-    next(iter(parts()))
-    code_parts([next(iter(parts()))], levels, TICKS)  # compiles, and takes what one part takes
-    before = peak()
-    coded = code_parts(parts(), levels, TICKS)
-    held = sum(array.nbytes for array in coded)
-    print(f"coding {count:,} trajectories in parts of {PART:,}: states of {(TICKS + 1) * 16} bytes each,")
-    print(f"{held / count:.0f} bytes coded, {held / 2**20:.0f} MiB; peak {peak():.0f} MiB, {before:.0f} for one part")
-
-
-def peak() -> float:
-    """The most memory that this process has held, in MiB."""
-    import resource
-
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--quick", action="store_true", help="fewer and smaller measurements")
-    parser.add_argument("--coding", type=int, help=argparse.SUPPRESS)
-    options = parser.parse_args()
-    if options.coding:
-        coding(options.coding)
-        return 0
-    print(f"{'benchmark':42}{'size':>9}  {'contender':10}{'seconds':>9}", flush=True)
-    for rows in (one_node, growth):
-        for row in rows(options.quick):
-            print(f"{row.benchmark:42}{row.size:9,}  {row.contender:10}{row.seconds:9.3f}", flush=True)
-    command = [sys.executable, __file__, "--coding", str(20_000 if options.quick else 100_000)]
-    return subprocess.run(command, check=False, env=os.environ).returncode
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def measure(quick: bool) -> list[Result]:
+    search = functools.partial(contest, unit="search", agree=none_better)
+    world = CASE_STUDY_1_SOURCE.world
+    data = [collection(seed) for seed in range(1 if quick else 9)]
+    results = search("node of Case Study 1", contenders=contenders(tuple(SEARCHES), data, world, 3))
+    for count in TRAJECTORIES[:2] if quick else TRAJECTORIES:
+        names = (OURS, "swarm") if count <= 1_000 else (OURS,)
+        one = contenders(names, [walks(np.random.default_rng(1), world, count)], world, 1 if count > 10_000 else 3)
+        results += search("best primitive", contenders=one, axis="trajectories", size=count)
+    for size in WORLDS[:2] if quick else WORLDS:
+        larger = GridWorld(size)
+        one = contenders((OURS,), [walks(np.random.default_rng(1), larger, 1_000)], larger, 1)
+        results += search("best primitive", contenders=one, axis="world", size=size)
+    return results

@@ -45,6 +45,14 @@ def test_contenders_take_turns_after_one_that_is_not_timed():
     assert [(one.contender, one.seconds, one.cost) for one in results] == [(OURS, 1.0, 0.1), ("other", 1.0, 0.2)]
 
 
+def test_short_turns_are_timed_together():
+    log: list[str] = []
+    ticks = itertools.count()
+    contender = Contender(OURS, lambda: answering(1, log, "a"), 1, 2, warm=False, rounds=4)
+    (result,) = contest("sum", "number", [contender], clock=lambda: float(next(ticks)))
+    assert (result.seconds, len(log)) == (0.25, 8)
+
+
 def test_who_is_not_there_is_skipped_and_says_why():
     results = contest(
         "sum",
