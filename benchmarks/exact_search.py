@@ -37,7 +37,7 @@ from tickwise.rl.states import tau_memory
 TICKS = 40
 WEIGHT = CASE_STUDY_1.inference.information_weight
 TRAJECTORIES = (100, 1_000, 10_000, 100_000)
-WORLDS = (9, 15, 25, 50)
+WORLDS = (9, 12, 15, 20)
 
 
 def prior_of(world: GridWorld) -> PathPrior:

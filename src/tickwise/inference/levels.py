@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import mmap
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -171,8 +173,7 @@ def code(data: LabelledTrajectories, weights: NDArray[np.float64], levels: Level
     padded, counts = levels.arrays()
     words = horizon // WORD + 1
     shape = (len(counts), padded.shape[1], len(data), words)
-    at_least, at_most = np.zeros(shape, dtype=np.uint64), np.zeros(shape, dtype=np.uint64)
-    alive = np.zeros((len(data), words), dtype=np.uint64)
+    at_least, at_most, alive = _zeros(shape), _zeros(shape), _zeros((len(data), words))
     _code(data.values, data.lengths, padded, counts, horizon, at_least, at_most, alive)
     return Coded(at_least, at_most, alive, data.labels == 1, np.asarray(weights, dtype=np.float64))
 
@@ -186,13 +187,23 @@ def code_parts(parts: Iterable[LabelledTrajectories], levels: Levels, horizon: i
         horizon: The last tick that matters.
 
     Returns:
-        What `code` gives of all, with weights of 1; while the parts' bits are joined, half of them are held twice.
+        What `code` gives of all, with weights of 1. Nothing but one part's bits is ever held twice.
     """
-    coded = [code(part, np.ones(len(part)), levels, horizon) for part in parts]
-    fields = [list(arrays) for arrays in zip(*coded, strict=True)]
-    coded.clear()
-    # the parts' arrays of a field are let go before those of the next are joined
-    return Coded(*[np.concatenate(fields.pop(0), axis=axis) for axis in (2, 2, 0, 0, 0)])
+    kept = deque(code(part, np.ones(len(part)), levels, horizon) for part in parts)
+    n, (variables, sides, _, words) = sum(len(coded.positive) for coded in kept), kept[0].at_least.shape
+    at_least, at_most = _zeros((variables, sides, n, words)), _zeros((variables, sides, n, words))
+    alive, positive, end = _zeros((n, words)), np.empty(n, dtype=np.bool_), 0
+    while kept:
+        coded = kept.popleft()
+        rows, end = slice(end, end + len(coded.positive)), end + len(coded.positive)
+        at_least[:, :, rows], at_most[:, :, rows] = coded.at_least, coded.at_most
+        alive[rows], positive[rows] = coded.alive, coded.positive
+    return Coded(at_least, at_most, alive, positive, np.ones(n))
+
+
+def _zeros(shape: tuple[int, ...]) -> NDArray[np.uint64]:
+    """Zeros that take memory from when they are written, and give it back to the system once they are let go."""
+    return np.frombuffer(mmap.mmap(-1, 8 * math.prod(shape)), dtype=np.uint64).reshape(shape)
 
 
 @njit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,29 +11,43 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import DataError, MissingExtraError
-from tickwise.inference.longform import LongTable
+from tickwise.inference.longform import FIXED, LongTable
 from tickwise.inference.trajectories import LabelledTrajectories
 
 
 def read_parquet(file: Path, labelled: bool) -> LabelledTrajectories:
     """Read one file; see `tickwise.inference.reading.read_trajectories`."""
-    table = _load(file)
-    rows = LongTable(file, table.column_names, labelled)
-    data = _by_columns(table, rows.variables)
-    if data is not None:
-        return data
-    columns = (column.to_pylist() for column in table.columns)
-    for number, row in enumerate(zip(*columns, strict=True), start=1):
-        rows.add(row, f"row {number}")
-    return rows.finish()
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise MissingExtraError("reading Parquet needs pyarrow; pip install tickwise[parquet]") from None
+    try:
+        with pyarrow.parquet.ParquetFile(file) as stored:
+            # pandas stores the index of a data frame that was cut out of another
+            names = [name for name in stored.schema_arrow.names if not name.startswith("__index_level_")]
+            rows = LongTable(file, names, labelled)
+
+            def read(name: str) -> Any:  # a column at a time takes the least memory
+                return stored.read(columns=[name], use_threads=False).combine_chunks()[name]
+
+            data = _by_columns(read, names)
+            if data is None:
+                for number, row in enumerate(zip(*(read(name).to_pylist() for name in names), strict=True), start=1):
+                    rows.add(row, f"row {number}")
+                data = rows.finish()
+            pyarrow.default_memory_pool().release_unused()  # it would keep several times the size of the file
+            return data
+    except (pyarrow.ArrowException, OSError) as error:
+        raise DataError(f"{file} is not a Parquet file: {str(error).splitlines()[0]}") from None
 
 
 @dataclass(frozen=True, slots=True)
 class ParquetParts:
     """The trajectories of a folder of Parquet files, a part a file, in the order of the files' names.
 
-    It may be iterated any number of times. A file's trajectories are held until the next has been
-    read, and 8 bytes of every trajectory to the end.
+    It may be iterated any number of times. A file's trajectories are held until the next have been read,
+    and 8 bytes of every trajectory to the end.
 
     Attributes:
         folder: The folder; files in it that do not end in ``.parquet`` are left alone.
@@ -88,46 +102,45 @@ class ParquetParts:
                 raise DataError(f"trajectory {name!r} of {file} is in {other.name} too; make the names unique")
 
 
-def _load(file: Path) -> Any:
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise MissingExtraError("reading Parquet needs pyarrow; pip install tickwise[parquet]") from None
-    try:
-        with pyarrow.parquet.ParquetFile(file) as stored:
-            table = stored.read().combine_chunks()
-    except (pyarrow.ArrowException, OSError) as error:
-        raise DataError(f"{file} is not a Parquet file: {str(error).splitlines()[0]}") from None
-    # pandas stores the index of a data frame that was cut out of another
-    return table.select([k for k, name in enumerate(table.column_names) if not name.startswith("__index_level_")])
+def _by_columns(read: Callable[[str], Any], names: list[str]) -> LabelledTrajectories | None:
+    """What `LongTable` makes of the rows, whole columns at a time; None where something is unusual or wrong.
 
-
-def _by_columns(table: Any, variables: list[str]) -> LabelledTrajectories | None:
-    """What `LongTable` makes of the rows, whole columns at a time; None where something is unusual or wrong."""
-    found = {name: _numbers(table[name]) for name in table.column_names if name != "trajectory"}
-    columns = {name: column for name, column in found.items() if column is not None}
-    if len(columns) < len(found) or table["trajectory"].null_count or not len(table):
+    Args:
+        read: Gives a column by its name, in no more than one chunk.
+        names: The columns.
+    """
+    column = read("trajectory")
+    if column.null_count or not len(column):
         return None
-    encoded = table["trajectory"].chunk(0).dictionary_encode()
-    codes = encoded.indices.to_numpy().astype(np.int64)
-    used, first, codes = np.unique(codes, return_index=True, return_inverse=True)
+    encoded = column.chunk(0).dictionary_encode()
+    column = None
+    texts = encoded.dictionary.to_pylist()
+    used, first, codes = np.unique(encoded.indices.to_numpy(), return_index=True, return_inverse=True)
     order = np.argsort(first)  # of first rows, as a dictionary that was stored may have another
+    ids = [str(texts[number]).strip() for number in used[order].tolist()]
     codes = np.argsort(order)[codes]
-    names = encoded.dictionary.to_pylist()
-    ids = [str(names[number]).strip() for number in used[order].tolist()]
     rows, lengths = np.argsort(codes, kind="stable"), np.bincount(codes)
-    ticks = np.arange(len(rows)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
     codes = codes[rows]
-    labels = columns["label"] if "label" in columns else np.ones(len(rows))
-    own = labels[np.sort(first)]
-    wrong = (columns["tick"][rows] != ticks) | (labels[rows] != own[codes])
-    if wrong.any() or (np.abs(own) != 1).any() or len(set(ids)) < len(ids):
+    ticks = np.arange(len(rows)) - np.repeat(np.cumsum(lengths) - lengths, lengths)
+    variables = [name for name in names if name not in FIXED]
+    values, labels = np.full((len(ids), lengths.max(), len(variables)), np.nan), np.ones(len(ids))
+    for name in names:
+        if name == "trajectory":
+            continue
+        numbers = _numbers(read(name))
+        if numbers is None:
+            return None
+        numbers = numbers[rows]
+        if name == "label":
+            labels = numbers[ticks == 0]
+        expected = {"tick": ticks, "label": labels[codes]}.get(name, numbers)
+        if not np.array_equal(numbers, expected):
+            return None
+        if name in variables:
+            values[codes, ticks, variables.index(name)] = numbers
+    if (np.abs(labels) != 1).any() or len(set(ids)) < len(ids):
         return None
-    values = np.full((len(ids), lengths.max(), len(variables)), np.nan)
-    for column, name in enumerate(variables):
-        values[codes, ticks, column] = columns[name][rows]
-    return LabelledTrajectories.from_arrays(values, own, variables, lengths, ids)
+    return LabelledTrajectories.from_arrays(values, labels, variables, lengths, ids)
 
 
 def _numbers(column: Any) -> NDArray[np.float64] | None:

@@ -27,7 +27,7 @@ def scan_parts(
 
     The parts are gone through once, and each is held until the next has come. What is kept of a trajectory is its coded
     bits, ``2 * variables * levels + 1`` words of 8 bytes for every 64 ticks up to the horizon, and 9 bytes: 337 bytes
-    for two variables with 10 levels and 41 ticks. While they are joined in the end, half of them are held twice.
+    for two variables with 10 levels and 41 ticks.
 
     The thresholds of a continuous variable come from the data. Where there is one, the parts are gone through once
     before, to keep the values of the continuous variables alone, 8 bytes each, those of one variable twice; they are
