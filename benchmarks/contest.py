@@ -30,6 +30,7 @@ class Contender:
         work: Units of work in a repetition: a slow contender is given less.
         repetitions: How often it is timed.
         warm: Whether there is such a first turn.
+        rounds: Turns in a repetition, for what is too short to be timed alone; the time is that of one.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Contender:
     work: float
     repetitions: int
     warm: bool = True
+    rounds: int = 1
 
 
 def contest(
@@ -84,8 +86,9 @@ def contest(
         for one in contenders:
             if one.name in turns and repetition < one.repetitions:
                 begin = clock()
-                answers[one.name] = turns[one.name]()
-                seconds[one.name].append(clock() - begin)
+                for _ in range(one.rounds):
+                    answers[one.name] = turns[one.name]()
+                seconds[one.name].append((clock() - begin) / one.rounds)
     first = contenders[0]
     for one in contenders[1:]:
         comparable = one.name in answers and one.work == first.work

@@ -84,6 +84,7 @@ def _panel(axes: Axes, benchmark: str, axis: str, lines: Lines, styles: dict[str
         axes.plot(
             sizes, costs, dashes, color=colour, marker=marker, markersize=4.5, linewidth=2 if name == OURS else 1.2
         )
+    axes.margins(y=0.15)  # room for the names of lines that end early
     sizes = sorted({one.size for line in lines.values() for one in line})
     _sizes_on_axis(axes, sizes)
     axes.set_xlabel(_LABELS[axis])

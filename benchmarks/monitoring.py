@@ -1,13 +1,15 @@
-"""The verdict of a formula on many trajectories, beside the libraries that monitor temporal logic.
+"""The verdict and the robustness of a formula on many trajectories, beside C and the libraries that monitor it.
 
-The formula is that of Case Study 1's source; where trajectories grow longer, its windows grow with them. Each library
-is given the trajectories in the form that it wants, which is not timed, and answers for one after the other, since none
-takes a batch. Their answers have to be ours. What they do is more than a verdict where they cannot do less: rtamt and
-stlpy compute the robustness, metric-temporal-logic answers for every tick.
+The formula is that of Case Study 1's source; where trajectories grow longer, its windows grow with them. `monitoring.c`
+is written by hand for this formula; it stops reading a trajectory when it knows the answer. Each library is given the
+trajectories in the form that it wants, which is not timed, and answers for one after the other, since none takes a
+batch. Their answers have to be ours. metric-temporal-logic and mstlo give verdicts, the former for every tick; rtamt
+and stlpy give the robustness alone.
 """
 
 from __future__ import annotations
 
+import ctypes
 import functools
 import importlib
 import warnings
@@ -19,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.contest import Contender, Turn, contest
+from benchmarks.native import library, pointer
 from benchmarks.result import OURS, Result
 from tickwise.logic.parse import parse
 
@@ -63,21 +66,40 @@ def walks(count: int, ticks: int) -> NDArray[np.float64]:
     return states
 
 
-Check = Callable[[Any], bool]
+Check = Callable[[Any], bool | float]
 Maker = Callable[[Windows, NDArray[np.float64]], tuple[Check, Iterable[Any]]]
 
 
 def one_by_one(make: Maker, windows: Windows, states: NDArray[np.float64]) -> Turn:
-    """The verdicts by a check of one trajectory in the library's own form."""
+    """The answers by a check of one trajectory in the library's own form."""
     with warnings.catch_warnings(action="ignore"):  # old libraries in a young Python
         check, trajectories = make(windows, states)
     kept = list(trajectories)
     return lambda: np.array([check(one) for one in kept])
 
 
-def ours(windows: Windows, states: NDArray[np.float64]) -> Turn:
+def verdicts(windows: Windows, states: NDArray[np.float64]) -> Turn:
     phi = parse(str(windows))
     return lambda: phi.verdict(states, variables=("x", "y")) == 1
+
+
+def robustness(windows: Windows, states: NDArray[np.float64]) -> Turn:
+    phi = parse(str(windows))
+    return lambda: phi.robustness(states, variables=("x", "y"))
+
+
+def in_c(windows: Windows, states: NDArray[np.float64]) -> Turn:
+    function = library("monitoring").verdicts
+    function.restype = None
+    answers = np.empty(len(states), dtype=np.int8)
+    numbers = (*states.shape[:2], windows.first, windows.stay, windows.second, windows.last)
+    arguments = (pointer(states), *map(ctypes.c_long, numbers), pointer(answers))
+
+    def turn() -> NDArray[np.bool_]:
+        function(*arguments)
+        return answers == 1
+
+    return turn
 
 
 def rtamt(windows: Windows, states: NDArray[np.float64]) -> tuple[Check, Iterable[Any]]:
@@ -92,7 +114,7 @@ def rtamt(windows: Windows, states: NDArray[np.float64]) -> tuple[Check, Iterabl
     specification.parse()
     times = list(range(states.shape[1]))
     data = ({"time": times, "x": one[:, 0].tolist(), "y": one[:, 1].tolist()} for one in states)
-    return lambda one: specification.evaluate(one)[0][1] > 0, data
+    return lambda one: specification.evaluate(one)[0][1], data
 
 
 def metric_temporal_logic(windows: Windows, states: NDArray[np.float64]) -> tuple[Check, Iterable[Any]]:
@@ -120,7 +142,7 @@ def stlpy(windows: Windows, states: NDArray[np.float64]) -> tuple[Check, Iterabl
         return sides[0] & sides[1] & sides[2] & sides[3]
 
     phi = box(G).always(0, windows.stay).eventually(1, windows.first) & box(Y).eventually(windows.second, windows.last)
-    return lambda one: bool(phi.robustness(one, 0)[0] > 0), (np.ascontiguousarray(one.T) for one in states)
+    return lambda one: float(phi.robustness(one, 0)[0]), (np.ascontiguousarray(one.T) for one in states)
 
 
 def mstlo(windows: Windows, states: NDArray[np.float64]) -> tuple[Check, Iterable[Any]]:
@@ -156,30 +178,40 @@ class Peer(NamedTuple):
     most_ticks: int
 
 
-PEERS = {
-    "rtamt": Peer(rtamt, 3, 400),
-    "metric-temporal-logic": Peer(metric_temporal_logic, 1, 41),
-    "stlpy": Peer(stlpy, 3, 120),
-    "mstlo": Peer(mstlo, 3, 4_000),
-}
+VERDICTS = {"metric-temporal-logic": Peer(metric_temporal_logic, 1, 41), "mstlo": Peer(mstlo, 3, 4_000)}
+ROBUSTNESS = {"rtamt": Peer(rtamt, 3, 400), "stlpy": Peer(stlpy, 3, 120)}
 
 
-def contenders(count: int, ticks: int) -> list[Contender]:
-    """All of them for a hundred trajectories, ours alone for more."""
-    windows, states = Windows.fitting(ticks), walks(count, ticks)
-    return [Contender(OURS, functools.partial(ours, windows, states), 1, 5)] + [
+def peers(those: dict[str, Peer], windows: Windows, states: NDArray[np.float64]) -> list[Contender]:
+    """The libraries, for no more than a hundred trajectories and not too long ones."""
+    count, ticks = states.shape[:2]
+    return [
         Contender(name, functools.partial(one_by_one, peer.make, windows, states), 1, peer.repetitions)
-        for name, peer in PEERS.items()
+        for name, peer in those.items()
         if count <= MOST_FOR_PEERS and ticks <= peer.most_ticks
     ]
 
 
+def compare(count: int, ticks: int, axis: str, unit: str) -> list[Result]:
+    """All contenders on so many trajectories."""
+    windows, states = Windows.fitting(ticks), walks(count, ticks)
+    size = count if axis == "trajectories" else ticks
+    rounds = max(1, 1_000_000 // (count * ticks))
+    ours, robust, c = (
+        Contender(name, functools.partial(turn, windows, states), 1, 5, rounds=rounds)
+        for name, turn in ((OURS, verdicts), (OURS, robustness), ("C", in_c))
+    )
+    those = [ours, c, *peers(VERDICTS, windows, states)]
+    results = contest("verdicts", unit, those, axis=axis, size=size, agree=np.array_equal)
+    those = [robust, *peers(ROBUSTNESS, windows, states)]
+    return results + contest("robustness", unit, those, axis=axis, size=size, agree=np.allclose)
+
+
 def measure(quick: bool) -> list[Result]:
-    verdicts = functools.partial(contest, agree=np.array_equal)
     results = []
     for count in (10, 200) if quick else COUNTS:
-        results += verdicts("verdicts", "batch", contenders(count, 41), axis="trajectories", size=count)
+        results += compare(count, 41, "trajectories", "batch")
+    count = 10 if quick else MOST_FOR_PEERS
     for ticks in TICKS[:2] if quick else TICKS:
-        count = 10 if quick else MOST_FOR_PEERS
-        results += verdicts("verdicts", f"{count} trajectories", contenders(count, ticks), axis="ticks", size=ticks)
+        results += compare(count, ticks, "ticks", f"{count} trajectories")
     return results

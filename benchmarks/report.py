@@ -10,13 +10,13 @@ from dataclasses import asdict, fields
 from pathlib import Path
 
 from benchmarks.growth import draw
-from benchmarks.result import OURS, Result, duration
+from benchmarks.result import OURS, Result, duration, size_of
 
-_HEADINGS = ("benchmark", "size", "contender", "time", "per", "speed of tickwise")
+_HEADINGS = ("benchmark", "size", "contender", "time", "per", "speed of tickwise", "memory")
 
 
 def table(results: list[Result]) -> str:
-    """A Markdown table; the last column says how many times as fast Tickwise is as the contender."""
+    """A Markdown table; one column says how many times as fast Tickwise is as the contender."""
     base = {(one.benchmark, one.axis, one.size): one.cost for one in results if one.contender == OURS}
     rows = [_row(one, base.get((one.benchmark, one.axis, one.size))) for one in results]
     widths = [max(len(row[column]) for row in (_HEADINGS, *rows)) for column in range(len(_HEADINGS))]
@@ -29,9 +29,10 @@ def table(results: list[Result]) -> str:
 def _row(one: Result, ours: float | None) -> tuple[str, ...]:
     size = sized(one)
     if one.cost is None:
-        return one.benchmark, size, one.contender, "skipped", one.unit, one.skipped
+        return one.benchmark, size, one.contender, "skipped", one.unit, one.skipped, ""
     ratio = "" if ours is None or one.contender == OURS else times(one.cost / ours)
-    return one.benchmark, size, one.contender, duration(one.cost), one.unit, ratio
+    memory = "" if one.memory is None else size_of(one.memory)
+    return one.benchmark, size, one.contender, duration(one.cost), one.unit, ratio, memory
 
 
 def sized(one: Result) -> str:

@@ -24,6 +24,7 @@ class Result:
         work: Units of work in a repetition.
         unit: The unit of work.
         skipped: Why it did not run; empty if it did.
+        memory: Bytes that it took at most beside what the process had before; None if that was not measured.
     """
 
     benchmark: str
@@ -34,6 +35,7 @@ class Result:
     work: float = 1.0
     unit: str = "run"
     skipped: str = ""
+    memory: float | None = None
 
     def __post_init__(self) -> None:
         if self.axis not in AXES:
@@ -45,6 +47,11 @@ class Result:
     def cost(self) -> float | None:
         """Seconds a unit of work; None if it did not run."""
         return None if self.seconds is None else self.seconds / self.work
+
+
+def size_of(memory: float) -> str:
+    """Bytes for people, in units of a million, with three digits."""
+    return f"{memory / 1e6:.3g} MB"
 
 
 def duration(seconds: float) -> str:

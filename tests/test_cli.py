@@ -290,9 +290,20 @@ def test_a_file_that_is_no_data_file(tickwise: Tickwise, tmp_path: Path, name: s
     assert "\n" not in error
 
 
+def test_a_folder_of_parquet_is_read_as_one_file_is(tickwise: Tickwise, logs: Path, tmp_path: Path):
+    pytest.importorskip("pyarrow")
+    pandas, folder = pytest.importorskip("pandas"), tmp_path / "folder"
+    folder.mkdir()
+    for number, (_, rows) in enumerate(pandas.read_csv(logs).groupby("trajectory", sort=False)):
+        rows.to_parquet(folder / f"{number:03}.parquet")
+    answers = [json.loads(tickwise("infer", data, "--json").out) | {"seconds": 0} for data in (folder, logs)]
+    assert answers[0] == answers[1]
+    assert answers[0]["satisfying"]
+
+
 def test_missing_files(tickwise: Tickwise, tmp_path: Path):
     assert tickwise.fails("check", FORMULA, tmp_path / "no.csv").endswith("no.csv; check the path")
-    assert tickwise.fails("infer", tmp_path) == f"there is no file {tmp_path}; check the path"
+    assert tickwise.fails("infer", tmp_path).startswith(f"{tmp_path} has no .parquet file; give a file")
     assert "holds no run" in tickwise.fails("report", tmp_path / "no")
 
 

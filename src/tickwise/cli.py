@@ -46,7 +46,7 @@ _UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 Processes = Annotated[int | None, typer.Option(min=1, help="Processes (one a core).")]
 Address = Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Dask cluster that does the jobs.")]
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON document instead.")]
-_COLUMNS = "long CSV or Parquet (columns trajectory, tick, the variables, label), or NPZ (X, y, names)"
+_COLUMNS = "long CSV, Parquet (columns trajectory, tick, the variables, label; also a folder), or NPZ (X, y, names)"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -45,6 +45,14 @@ def test_contenders_take_turns_after_one_that_is_not_timed():
     assert [(one.contender, one.seconds, one.cost) for one in results] == [(OURS, 1.0, 0.1), ("other", 1.0, 0.2)]
 
 
+def test_short_turns_are_timed_together():
+    log: list[str] = []
+    ticks = itertools.count()
+    contender = Contender(OURS, lambda: answering(1, log, "a"), 1, 2, warm=False, rounds=4)
+    (result,) = contest("sum", "number", [contender], clock=lambda: float(next(ticks)))
+    assert (result.seconds, len(log)) == (0.25, 8)
+
+
 def test_who_is_not_there_is_skipped_and_says_why():
     results = contest(
         "sum",
@@ -79,6 +87,7 @@ def test_files_hold_every_result(tmp_path: Path):
         for name, seconds in ((OURS, 1e-3), ("C", 2e-3), ("peer", 1.0))
     ]
     results.append(Result("sum", "world", 9, "gone", None, skipped="not here"))
+    results.append(Result("sum", "none", 0, OURS, 1.0, memory=65.6e6))
     write(results, tmp_path, quick=True)
     document = json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
     assert [one["contender"] for one in document["results"]] == [one.contender for one in results]
@@ -88,6 +97,7 @@ def test_files_hold_every_result(tmp_path: Path):
     assert len(lines) == len(results) + 2
     assert "2.00×" in lines[3]
     assert "1,000×" in lines[4]
+    assert lines[-1].endswith(" 65.6 MB |")
     picture = (tmp_path / "growth.svg").read_text(encoding="utf-8")
     assert all(f">{name}<" in picture for name in (OURS, "C", "peer", "sum", "9", "100"))
     assert (tmp_path / "growth.png").stat().st_size > 1000

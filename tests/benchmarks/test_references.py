@@ -9,7 +9,7 @@ import pytest
 from benchmarks.contest import UnavailableError
 from benchmarks.native import library
 
-from benchmarks import counting, learning, planning
+from benchmarks import counting, learning, monitoring, planning
 
 
 @pytest.fixture(autouse=True)
@@ -44,3 +44,12 @@ def test_counting(size: int, horizon: int):
     assert expected < -1
     assert math.isclose(case.in_c()(), expected, rel_tol=1e-12)
     assert math.isclose(case.in_scipy()(), expected, rel_tol=1e-9)
+
+
+@pytest.mark.parametrize("ticks", [10, 41, 100])
+def test_monitoring(ticks: int):
+    windows, states = monitoring.Windows.fitting(ticks), monitoring.walks(500, ticks)
+    expected = monitoring.verdicts(windows, states)()
+    assert 0 < expected.sum() < 500
+    np.testing.assert_array_equal(monitoring.in_c(windows, states)(), expected)
+    np.testing.assert_array_equal(monitoring.robustness(windows, states)() > 0, expected)

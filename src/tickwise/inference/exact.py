@@ -211,7 +211,7 @@ def improve(problem: ExactProblem, settings: ExactSettings, least: float) -> Exa
 
 
 def beyond_levels(problem: ExactProblem, settings: ExactSettings) -> float:
-    """A bound on J for boxes with any sides at all: the most that more levels could give.
+    """A bound on J for sides anywhere, at least the levels' resolution apart: the most that more levels could give.
 
     Between two levels a side is treated as loose for trajectories with label 1 and as tight for the others, so the
     bound is above what is there. Where all thresholds are levels, it says nothing that `exact_search` does not.
@@ -221,7 +221,7 @@ def beyond_levels(problem: ExactProblem, settings: ExactSettings) -> float:
         settings: The limits; a search that is stopped gives a greater bound.
 
     Returns:
-        No primitive with closed or open sides anywhere is worth more than this, in units of J.
+        No primitive with such sides is worth more than this, in units of J.
     """
     prior = problem.prior.arrays(problem.levels.variables)
     clock, order = _Clock(settings.seconds), itertools.count()

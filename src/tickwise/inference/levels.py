@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import mmap
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -40,6 +42,11 @@ class Levels:
 
     @classmethod
     def of(cls, space: SearchSpace, data: LabelledTrajectories, cap: int) -> Levels:
+        """The levels of a search space for data in one part; see `of_parts`."""
+        return cls.of_parts(space, (data,), cap)
+
+    @classmethod
+    def of_parts(cls, space: SearchSpace, parts: Iterable[LabelledTrajectories], cap: int) -> Levels:
         """The levels of a search space: its edges, and between neighbouring values of a continuous variable.
 
         A continuous variable with more than ``cap`` such places gets a third of its levels evenly by rank, a third
@@ -48,7 +55,8 @@ class Levels:
 
         Args:
             space: The search space.
-            data: The trajectories whose values the levels of continuous variables lie between.
+            parts: The trajectories whose values the levels of continuous variables lie between; these values are held
+                all at once, and those of one variable twice. Without such variables no part is asked for.
             cap: The most levels of a continuous variable, open sides not counted.
 
         Returns:
@@ -59,15 +67,14 @@ class Levels:
         """
         if cap < 1:
             raise ConfigurationError(f"a cap of {cap} levels leaves no threshold; use 1 or more")
+        gathered = _Gathered.of(parts, np.flatnonzero(space.continuous).tolist())
         sides, complete, resolution = [], True, []
         for column, (edges, continuous) in enumerate(zip(space.edges, space.continuous, strict=True)):
             if not continuous:
                 sides.append(np.array(edges))
                 resolution.append(np.diff(edges).min())
                 continue
-            states = data.values[..., column]
-            values = np.sort(states[~np.isnan(states)])
-            extremes = np.sort(np.concatenate([np.nanmin(states, axis=1), np.nanmax(states, axis=1)]))
+            values, extremes = gathered.sorted(column)
             low, high = _neighbours(values, extremes, cap)
             steps = np.diff(values)
             complete = complete and len(low) == np.count_nonzero(steps)
@@ -85,6 +92,31 @@ class Levels:
         for row, levels in zip(padded, self.sides, strict=True):
             row[: len(levels)] = levels
         return padded, counts
+
+
+@dataclass(frozen=True, slots=True)
+class _Gathered:
+    """The values of some variables in all parts, and the extremes of each trajectory, by the variable's column."""
+
+    values: dict[int, list[NDArray[np.float64]]]
+    extremes: dict[int, list[NDArray[np.float64]]]
+
+    @classmethod
+    def of(cls, parts: Iterable[LabelledTrajectories], columns: list[int]) -> _Gathered:
+        gathered = cls({column: [] for column in columns}, {column: [] for column in columns})
+        for part in parts if columns else ():
+            for column in columns:
+                states = part.values[..., column]
+                gathered.values[column].append(states[~np.isnan(states)])
+                gathered.extremes[column] += [np.nanmin(states, axis=1), np.nanmax(states, axis=1)]
+        return gathered
+
+    def sorted(self, column: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Both in increasing order, and no longer held here."""
+        values, extremes = np.concatenate(self.values.pop(column)), np.concatenate(self.extremes.pop(column))
+        values.sort()
+        extremes.sort()
+        return values, extremes
 
 
 def _neighbours(
@@ -141,19 +173,37 @@ def code(data: LabelledTrajectories, weights: NDArray[np.float64], levels: Level
     padded, counts = levels.arrays()
     words = horizon // WORD + 1
     shape = (len(counts), padded.shape[1], len(data), words)
-    at_least, at_most = np.zeros(shape, dtype=np.uint64), np.zeros(shape, dtype=np.uint64)
-    alive = np.zeros((len(data), words), dtype=np.uint64)
+    at_least, at_most, alive = _zeros(shape), _zeros(shape), _zeros((len(data), words))
     _code(data.values, data.lengths, padded, counts, horizon, at_least, at_most, alive)
     return Coded(at_least, at_most, alive, data.labels == 1, np.asarray(weights, dtype=np.float64))
 
 
-def code_parts(
-    parts: Iterable[tuple[LabelledTrajectories, NDArray[np.float64]]], levels: Levels, horizon: int
-) -> Coded:
-    """Code data that comes in parts, each held no longer than it takes to code it: what `code` gives of the whole."""
-    coded = [code(data, weights, levels, horizon) for data, weights in parts]
-    at_least, at_most, *rest = zip(*coded, strict=True)
-    return Coded(np.concatenate(at_least, axis=2), np.concatenate(at_most, axis=2), *map(np.concatenate, rest))
+def code_parts(parts: Iterable[LabelledTrajectories], levels: Levels, horizon: int) -> Coded:
+    """Code data that comes in parts, each held no longer than it takes to code it: what `code` gives of the whole.
+
+    Args:
+        parts: The trajectories; at least one part.
+        levels: The levels.
+        horizon: The last tick that matters.
+
+    Returns:
+        What `code` gives of all, with weights of 1. Nothing but one part's bits is ever held twice.
+    """
+    kept = deque(code(part, np.ones(len(part)), levels, horizon) for part in parts)
+    n, (variables, sides, _, words) = sum(len(coded.positive) for coded in kept), kept[0].at_least.shape
+    at_least, at_most = _zeros((variables, sides, n, words)), _zeros((variables, sides, n, words))
+    alive, positive, end = _zeros((n, words)), np.empty(n, dtype=np.bool_), 0
+    while kept:
+        coded = kept.popleft()
+        rows, end = slice(end, end + len(coded.positive)), end + len(coded.positive)
+        at_least[:, :, rows], at_most[:, :, rows] = coded.at_least, coded.at_most
+        alive[rows], positive[rows] = coded.alive, coded.positive
+    return Coded(at_least, at_most, alive, positive, np.ones(n))
+
+
+def _zeros(shape: tuple[int, ...]) -> NDArray[np.uint64]:
+    """Zeros that take memory from when they are written, and give it back to the system once they are let go."""
+    return np.frombuffer(mmap.mmap(-1, 8 * math.prod(shape)), dtype=np.uint64).reshape(shape)
 
 
 @njit

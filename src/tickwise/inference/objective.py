@@ -54,8 +54,8 @@ def trajectory_weights(labels: NDArray[np.int8], class_weight: ClassWeight) -> N
     if isinstance(class_weight, str):
         if class_weight != "balanced":
             raise ConfigurationError(f"class_weight is {class_weight!r}; use None, 'balanced' or a mapping")
-        counts = np.array([np.count_nonzero(labels == label) for label in labels])
-        return len(labels) / (2.0 * counts)
+        positives = np.count_nonzero(labels == 1)
+        return len(labels) / (2.0 * np.where(labels == 1, positives, len(labels) - positives))
     unknown = set(class_weight) - {1, -1}
     if unknown or any(weight <= 0 for weight in class_weight.values()):
         raise ConfigurationError(f"class_weight is {dict(class_weight)!r}; map the labels 1 and -1 to weights above 0")

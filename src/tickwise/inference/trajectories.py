@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,6 +99,28 @@ class LabelledTrajectories:
         names = tuple(f"x{column}" for column in range(values.shape[2])) if variables is None else tuple(variables)
         labels = tuple(str(number) for number in range(len(values))) if ids is None else tuple(ids)
         return cls(values, np.asarray(counts), np.asarray(y), names, labels)
+
+    @classmethod
+    def joined(cls, parts: Iterable[LabelledTrajectories]) -> LabelledTrajectories:
+        """All trajectories of parts with the same variables, one part after the other.
+
+        Raises:
+            DataError: If there is no part, variables differ, or an id occurs twice.
+        """
+        kept = list(parts)
+        variables = {part.variables for part in kept}
+        if len(variables) != 1:
+            raise DataError(f"{len(variables)} different lists of variables; give one part or more with the same")
+        ticks = max(part.values.shape[1] for part in kept)
+        values = np.full((sum(map(len, kept)), ticks, kept[0].values.shape[2]), np.nan)
+        row = 0
+        for part in kept:
+            values[row : row + len(part), : part.values.shape[1]] = part.values
+            row += len(part)
+        lengths, labels = (
+            np.concatenate(arrays) for arrays in zip(*((p.lengths, p.labels) for p in kept), strict=True)
+        )
+        return cls(values, lengths, labels, kept[0].variables, tuple(name for part in kept for name in part.ids))
 
     def __len__(self) -> int:
         return len(self.labels)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError, DataError
-from tickwise.inference.exact import ExactProblem, ExactSettings, exact_search, worth_of
-from tickwise.inference.levels import Levels, code
+from tickwise.inference.exact import ExactProblem, ExactResult, ExactSettings, exact_search, worth_of
+from tickwise.inference.levels import Coded, Levels, code
 from tickwise.inference.objective import ClassWeight, Objective, formula_signature, trajectory_weights
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import Gaps, SearchSpace, shape_of
@@ -274,8 +274,7 @@ class _Grower:
     ) -> _Found:
         levels = Levels.of(self.space, data, limits.levels)
         coded = code(data, weights, levels, self.space.horizon)
-        worth = worth_of(coded, self.settings.information_weight, self._nesting_cost(data))
-        best = exact_search(ExactProblem(coded, levels, self.prior, gaps, worth), limits)
+        best = best_primitive(coded, levels, self.prior, gaps, self.settings, limits)
         return _Found(best.primitive, best.objective, best.rate, best.gain, best.gap, best.interrupted)
 
     def _by_swarm(
@@ -304,6 +303,27 @@ class _Grower:
         assert winner is not None  # the gaps have room for ◇ at least
         primitive, value, objective = winner
         return _Found(primitive, value, *objective.parts(SDNF((SequentialConjunction((primitive,)),))))
+
+
+def best_primitive(
+    coded: Coded, levels: Levels, prior: Prior, gaps: Gaps, settings: InferenceSettings, limits: ExactSettings
+) -> ExactResult:
+    """Line 11 of Algorithm 1 by exact search, at a node that coded trajectories have reached.
+
+    Args:
+        coded: The trajectories, with their weights.
+        levels: The levels that they were coded by.
+        prior: The prior G_L.
+        gaps: Free intervals of ticks, so that θ is in Υ_z.
+        settings: λ, and what a nested structure costs.
+        limits: The limits of the search.
+
+    Returns:
+        The best primitive.
+    """
+    cost = settings.nesting_penalty(len(coded.positive), prior.horizon)
+    worth = worth_of(coded, settings.information_weight, cost)
+    return exact_search(ExactProblem(coded, levels, prior, gaps, worth), limits)
 
 
 def classification_rate(
