@@ -47,6 +47,7 @@ Processes = Annotated[int | None, typer.Option(min=1, help="Processes (one a cor
 Address = Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Dask cluster that does the jobs.")]
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON document instead.")]
 _COLUMNS = "long CSV, Parquet (columns trajectory, tick, the variables, label; also a folder), or NPZ (X, y, names)"
+_PROTOCOL = "Whose formulas to learn with: paper (200 negatives, swarm) or full (all negatives, exact search)."
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -150,6 +151,7 @@ def reproduce(
     workers: Processes = None,
     cluster: Address = None,
     seed: Annotated[int, typer.Option(min=0, help="The root seed.")] = 0,
+    protocol: Annotated[str, typer.Option(help=_PROTOCOL)] = "paper",
 ) -> None:
     """Reproduce the paper's case studies, with a report; a second call goes on where the first one stopped.
 
@@ -164,9 +166,9 @@ def reproduce(
     folder = out or Path("runs") / (f"{study}-quick" if quick else study)
     jobs = executor(workers, cluster)
     if study in ("random", "all"):
-        _carry_out(find_suite(study, tasks=tasks, runs=runs, seed=seed, quick=quick), folder, jobs)
+        _carry_out(find_suite(study, tasks=tasks, runs=runs, seed=seed, quick=quick, protocol=protocol), folder, jobs)
         return
-    spec = find_study(study, quick=quick, runs=runs, seed=seed)
+    spec = find_study(study, quick=quick, runs=runs, seed=seed, protocol=protocol)
     if tasks is not None:
         raise ConfigurationError(f"{study} has no random tasks; leave --tasks out, or reproduce random or all")
     with _resumable(folder):
@@ -199,8 +201,8 @@ def _show(summary: Mapping[str, Any], folder: Path) -> None:
     """What a run folder shows, and where its report is."""
     from tickwise.experiments.tables import study_tables, suite_tables
 
-    tables = suite_tables(summary, folder) if "suite" in summary else study_tables(summary)
-    for table in tables:
+    tables = suite_tables if "suite" in summary else study_tables
+    for table in tables(summary, folder):
         output.print(table)
     output.print(f"report: {folder / 'report.html'}")
 

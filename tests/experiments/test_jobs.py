@@ -13,16 +13,9 @@ from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError, DataError, MissingFileError, StoreError
 from tickwise.experiments import jobs
 from tickwise.experiments.artefacts import Artefact, Parcel
-from tickwise.experiments.jobs import (
-    STEPS,
-    Job,
-    compute,
-    evaluation_points,
-    labelled_data,
-    learning_problem,
-    perform,
-    study_formulas,
-)
+from tickwise.experiments.inferences import STEPS, labelled_data, study_formulas
+from tickwise.experiments.job import Job
+from tickwise.experiments.jobs import compute, evaluation_points, learning_problem, perform
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import StudySpec
 from tickwise.logic.structure import structurally_transferable
@@ -43,6 +36,7 @@ def open_store(folder: Path, spec: StudySpec = TINY) -> Store:
     [
         (Job("collect", "source", 0), "collect-source-0", "collect in the source task, run 1", "episodes"),
         (Job("infer", "", 3), "infer-3", "infer formulas, run 4", "formulas"),
+        (Job("infer", "full", 0), "infer-full-0", "infer formulas from all trajectories, run 1", "formulas"),
         (Job("learn", "source", 1), "learn-source-1", "learn the source task, run 2", "episodes"),
         (Job("learn", "IV", 9), "learn-IV-9", "Method IV, run 10", "episodes"),
     ],
@@ -153,7 +147,7 @@ def test_an_artefact_is_there_only_with_its_cost(tmp_path: Path, monkeypatch: py
 
 def test_inference_finds_a_transferable_structure(finished: Path):
     store = open_store(finished)
-    found, formulas = store.load("infer-0"), study_formulas(store)
+    found, formulas = store.load("infer-0"), study_formulas(TINY, store)
     assert found["source"]["satisfying"]
     assert found["target"]["transferable"]
     source, target, plain = (formulas[key] for key in ("source", "target", "target_without_information"))
@@ -175,7 +169,7 @@ def test_formulas_that_do_not_satisfy_are_not_learned_with(tmp_path: Path):
     fit = {"formula": "F[0,3] (x >= 3)", "satisfying": False}
     manifest = {"source": fit, "target": {"formula": None}, "target_without_information": fit}
     store.save("infer-0", manifest, {})
-    formulas = study_formulas(store)
+    formulas = study_formulas(TINY, store)
     assert str(formulas["source"]) == "F[0,3] (x >= 3)"
     assert formulas["target"] is None
     assert formulas["target_without_information"] is None
@@ -191,7 +185,7 @@ def test_learning_needs_the_formulas(tmp_path: Path):
 
 def test_memories_of_the_methods(finished: Path):
     store = open_store(finished)
-    formulas = study_formulas(store)
+    formulas = study_formulas(TINY, store)
     for subject, key in (("source", "source"), ("II", "target_without_information"), ("III", "target")):
         problem = learning_problem(TINY, store, subject)
         formula = formulas[key]
@@ -272,15 +266,22 @@ def test_noise_turns_the_labels_of_a_share_round(finished: Path):
 
 
 @pytest.mark.parametrize(
-    "job", [Job("collect", "target", 1), Job("infer", "", 1), *(Job("learn", who, 1) for who in ("I", "II", "IV"))]
+    "job",
+    [
+        Job("collect", "target", 1),
+        Job("infer", "", 1),
+        Job("infer", "full", 1),
+        *(Job("learn", who, 1) for who in ("I", "II", "IV")),
+    ],
 )
 def test_a_job_needs_nothing_but_what_it_says(finished: Path, job: Job):
     store = open_store(finished)
-    parcel = Parcel({name: store.get(name) for name in job.needs})
+    needed = job.needs(TINY)
+    parcel = Parcel({name: store.get(name) for name in needed})
     cost, artefact = compute(job, TINY, parcel, silent)
     assert cost.name == f"cost-{job.name}"
     ours, theirs = artefact, store.get(job.name)
     assert (ours.name, ours.manifest, ours.arrays) == (theirs.name, theirs.manifest, theirs.arrays)
-    for name in job.needs:
+    for name in needed:
         with pytest.raises(KeyError, match=name):
-            compute(job, TINY, Parcel({other: store.get(other) for other in job.needs if other != name}), silent)
+            compute(job, TINY, Parcel({other: store.get(other) for other in needed if other != name}), silent)

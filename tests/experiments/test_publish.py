@@ -34,7 +34,9 @@ def shown(folder: Path) -> dict[str, bytes]:
 
 def test_everything_is_there(finished: Path):
     names = {path.name for path in finished.iterdir()}
-    assert names == {"artefacts", "config.json", "environment.json", "figures", "report.html", "summary.json"}
+    assert names == {
+        "artefacts", "config.json", "environment.json", "figures", "report.html", "summary.json", "times",
+    }  # fmt: skip
     summary = read_json(finished / "summary.json")
     assert {"formulas", "transferable", "v_star", "methods"} <= set(summary)
     assert set(summary["formulas"]) == {"source", "target", "target_without_information"}

@@ -28,7 +28,7 @@ def test_every_other_pair_is_similar():
         assert structurally_transferable(target, source) == pair.similar
         assert target.size <= SIZE
         assert (pair.runs, list(pair.inferences)) == (2, [0])
-        assert pair.reference == pair.source.task.formula
+        assert pair.true == {"source": pair.source.task.formula, "target": pair.target.task.formula}
         for environment in (pair.source, pair.target):
             assert environment.task.ends in ("deadline", "violated")
             assert best_success_probability(environment.mdp(), environment.task_table()) >= 0.95

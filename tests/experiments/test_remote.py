@@ -11,7 +11,7 @@ from tests.experiments.tiny import TINY
 from tickwise.errors import ConfigurationError
 from tickwise.experiments import remote
 from tickwise.experiments.identity import difference, identity
-from tickwise.experiments.jobs import Job
+from tickwise.experiments.job import Job
 from tickwise.experiments.plain import from_plain
 from tickwise.experiments.store import Store
 
@@ -26,7 +26,7 @@ def test_a_job_needs_no_folder(finished: Path, monkeypatch: pytest.MonkeyPatch):
     told: list[tuple[int, int]] = []
     monkeypatch.setattr(remote, "_reporter", lambda _topic, _index: lambda *step: told.append(step))
     store = Store(finished)
-    sent = [(name, store.get(name).manifest, store.get(name).arrays) for name in Job("learn", "IV", 0).needs]
+    sent = [(name, store.get(name).manifest, store.get(name).arrays) for name in Job("learn", "IV", 0).needs(TINY)]
     cost, given = remote.carry_out(ASKED, identity(), sent, "topic", 3)
     wanted = store.get("learn-IV-0")
     assert given == (wanted.name, wanted.manifest, wanted.arrays)

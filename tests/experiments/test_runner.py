@@ -22,7 +22,7 @@ from tests.experiments.tiny import HOPELESS, LONG, TINY
 from tickwise.errors import ConfigurationError, DataError, StoreError, TickwiseError
 from tickwise.experiments import executors
 from tickwise.experiments.executors import default_workers
-from tickwise.experiments.jobs import Job
+from tickwise.experiments.job import Job
 from tickwise.experiments.progress import Display
 from tickwise.experiments.runner import (
     Unit,
@@ -59,7 +59,7 @@ def test_every_job_leaves_its_artefact(finished: Path):
     names = {job.name for job in planned_jobs(TINY, store)}
     learned = {f"learn-{subject}-{run}" for subject in ("source", *METHODS) for run in (0, 1)}
     collected = {f"collect-{task}-{run}" for task in ("source", "target") for run in (0, 1)}
-    assert names == learned | collected | {"infer-0", "infer-1"}
+    assert names == learned | collected | {"infer-0", "infer-1", "infer-full-0", "infer-full-1"}
     manifests = {path.stem for path in (finished / "artefacts").glob("*.json")}
     assert manifests == names | {f"cost-{name}" for name in names}
     assert not list(finished.rglob("*.tmp"))
@@ -76,7 +76,7 @@ def test_the_longest_learning_comes_first(tmp_path: Path, monkeypatch: pytest.Mo
 
     monkeypatch.setattr(executors, "perform", noted)
     learning = replace(TINY.learning, source_episodes=300, most_episodes={"I": 100, "III": 200, "IV": 50})
-    run(replace(TINY, runs=1, learning=learning), tmp_path / "run")
+    run(replace(TINY, runs=1, full=0, learning=learning), tmp_path / "run")
     assert done[3:] == ["learn-source-0", "learn-III-0", "learn-I-0", "learn-IV-0"]
 
 
@@ -86,7 +86,7 @@ def test_several_studies_are_carried_out_phase_by_phase(tmp_path: Path):
     stream = io.StringIO()
     stores = run_units(units, 1, Display(Console(file=stream)))
     assert [line for line in stream.getvalue().splitlines() if "jobs" in line] == [
-        "Collect: 6 jobs", "Infer: 3 jobs", "Learn: 12 jobs", "Transfer: 3 jobs",
+        "Collect: 6 jobs", "Infer: 6 jobs", "Learn: 12 jobs", "Transfer: 3 jobs",
     ]  # fmt: skip
     assert [unfinished(unit.spec, store) for unit, store in zip(units, stores, strict=True)] == [None, None]
     run(other, tmp_path / "alone")
@@ -99,7 +99,7 @@ def test_a_finished_study_is_left_alone(finished: Path, monkeypatch: pytest.Monk
     run_study(TINY, finished, 3, Display(Console(file=stream)))
     assert stream.getvalue().splitlines() == [
         "Collect: 4 jobs finished before",
-        "Infer: 2 jobs finished before",
+        "Infer: 4 jobs finished before",
         "Learn: 8 jobs finished before",
         "Transfer: 2 jobs finished before",
     ]

@@ -10,22 +10,24 @@ import pytest
 
 from tests.experiments.tiny import HOPELESS, TINY
 from tickwise.errors import MissingFileError
-from tickwise.experiments.jobs import Job, perform
+from tickwise.experiments.job import Job
+from tickwise.experiments.jobs import perform
 from tickwise.experiments.store import Store
 from tickwise.experiments.summary import command, gather
 
 SOURCE = "F[0,5] G[0,2] (x <= 2 & y <= 2) & F[8,14] (x >= 2 & y >= 2)"
 TARGET = "F[0,5] G[0,2] (x >= 2 & y <= 2) & F[8,14] (x <= 2 & y >= 2)"
+ALONE = replace(TINY, full=0)
 TREE = {"label": None, "formula": None}
 
 
 @pytest.fixture(scope="module")
 def by_hand(tmp_path_factory: pytest.TempPathFactory) -> Store:
     """Collections as they are, and made-up formulas and curves of methods I and III."""
-    store = Store.open(tmp_path_factory.mktemp("by_hand"), TINY.as_dict())
+    store = Store.open(tmp_path_factory.mktemp("by_hand"), ALONE.as_dict())
     for run in (0, 1):
         for task in ("source", "target"):
-            perform(Job("collect", task, run), TINY, store, lambda _done, _total: None)
+            perform(Job("collect", task, run), ALONE, store, lambda _done, _total: None)
         fit = {"formula": SOURCE if run == 0 else "F[0,3] (x >= 3)", "satisfying": True, "tree": TREE}
         target = {
             "formula": TARGET if run == 0 else None,
@@ -58,7 +60,7 @@ def save_curve(
 
 @pytest.fixture(scope="module")
 def results(by_hand: Store) -> dict[str, Any]:
-    return gather(TINY, by_hand, "1.2.3")
+    return gather(ALONE, by_hand, "1.2.3")
 
 
 def test_the_summary_of_curves_that_were_made_up(results: dict[str, Any]):
@@ -102,7 +104,7 @@ def test_structures_are_counted(results: dict[str, Any]):
 
 
 def test_a_window_is_the_first_blocks_only(by_hand: Store):
-    spec = replace(TINY, learning=replace(TINY.learning, window=20))
+    spec = replace(ALONE, learning=replace(TINY.learning, window=20))
     found = gather(spec, by_hand, "1.2.3")["summary"]["methods"]["III"]
     assert found["window_mean"] == [0.0, 52.0]
 

@@ -51,6 +51,10 @@ TINY = replace(
         evaluation_episodes=50,
         evaluation_steps=((1_000, 100), (0, 2_000)),
     ),
+    true={
+        "source": "F[0,5] G[0,2] (x <= 2 & y <= 2) & F[8,14] (x >= 2 & y >= 2)",
+        "target": "F[0,5] G[0,2] (x >= 2 & y <= 2) & F[8,14] (x <= 2 & y >= 2)",
+    },
     runs=2,
 )
 """Two worlds of 4×4 cells, 14 ticks, two runs: all four methods, as in Case Study 1."""

@@ -28,12 +28,12 @@ STUDY = replace(
 """The tiny study with a single run and little learning."""
 
 
-def pairs(count: int, seed: int = 0, *, runs: int = 1) -> tuple[StudySpec, ...]:
+def pairs(count: int, seed: int = 0, *, runs: int = 1, protocol: str = "paper") -> tuple[StudySpec, ...]:
     """Pairs that are similar and pairs that are not, in turn, in the worlds of the tiny study."""
-    return tuple(_pair(number, seed, runs) for number in range(count))
+    return tuple(_pair(number, seed, runs, protocol) for number in range(count))
 
 
-def _pair(number: int, seed: int, runs: int) -> StudySpec:
+def _pair(number: int, seed: int, runs: int, protocol: str) -> StudySpec:
     similar = number % 2 == 0
     source, target = "F[2,9] (0 <= x <= 1 & 0 <= y <= 1)", "F[3,11] (3 <= x <= 4 & 2 <= y <= 4)"
     if not similar:
@@ -48,10 +48,12 @@ def _pair(number: int, seed: int, runs: int) -> StudySpec:
         **environments,
         collection=replace(STUDY.collection, epsilon=1.0, negatives=100),
         inference=replace(STUDY.inference, size=1, rate=0.99),
-        reference=source,
+        true={"source": source, "target": target},
         similar=similar,
         runs=runs,
         collections=1,
+        protocol=protocol,
+        full=1 if protocol == "full" else 0,
         seed=seed,
     )
 

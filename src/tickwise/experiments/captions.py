@@ -47,7 +47,9 @@ def captions(spec: StudySpec) -> dict[str, Caption]:
             "Fig. 3, the decision tree",
             "Rounded boxes hold primitives with their classification rate and information gain at the node, "
             "rectangles hold path formulas. A condition says why a node is a leaf: I, enough trajectories have one "
-            "label; II, the greatest depth; III, no ticks are left.",
+            "label; II, the greatest depth; III, no ticks are left."
+            + " The full protocol finds all primitives together, without a tree."
+            * (spec.protocol == "full"),
         ),
         "automata": Caption(
             "Timed automata",

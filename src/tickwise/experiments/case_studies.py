@@ -12,13 +12,15 @@ from tickwise.envs.catalog import (
 )
 from tickwise.errors import ConfigurationError
 from tickwise.experiments.random_pairs import find_pair
-from tickwise.experiments.study import Collection, Goal, Learning, Published, StudySpec
+from tickwise.experiments.study import Collection, Goal, Learning, Published, StudySpec, check_protocol
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.tree import InferenceSettings
 from tickwise.rl.qlearning import QSettings
 
 _SOURCE_1 = "F[1,15] G[0,4] (3 <= x <= 4 & 3 <= y <= 5) & F[21,39] (7 <= x <= 8 & 5 <= y <= 8)"
+_TARGET_1 = "F[1,16] G[0,5] (5 <= x <= 6 & 6 <= y <= 7) & F[22,39] (4 <= x <= 7 & 0 <= y <= 2)"
 _SOURCE_2 = "G[0,25] F[0,8] (2 <= x <= 3 & 2 <= y <= 3)"
+_TARGET_2 = "G[0,40] F[0,10] (2 <= x <= 3 & 3 <= y <= 4) | G[0,40] F[0,10] (4 <= x <= 5 & 3 <= y <= 4)"
 
 CASE_STUDY_1 = StudySpec(
     name="case1",
@@ -29,7 +31,7 @@ CASE_STUDY_1 = StudySpec(
     inference=InferenceSettings(size=4, rate=0.95, information_weight=0.01, depth=2),
     swarm=SwarmSettings(),
     learning=Learning(),
-    reference=_SOURCE_1,
+    true={"source": _SOURCE_1, "target": _TARGET_1},
     published=Published(
         formulas={
             "source": _SOURCE_1,
@@ -63,11 +65,11 @@ CASE_STUDY_2 = StudySpec(
         goal=Goal(block=1, above=1_000.0),
         window=7_000,
     ),
-    reference=_SOURCE_2,
+    true={"source": _SOURCE_2, "target": _TARGET_2},
     published=Published(
         formulas={
             "source": _SOURCE_2,
-            "target": ("G[0,40] F[0,10] (2 <= x <= 3 & 3 <= y <= 4) | G[0,40] F[0,10] (4 <= x <= 5 & 3 <= y <= 4)"),
+            "target": _TARGET_2,
             "target_without_information": (
                 "G[0,40] F[0,10] (2 <= x <= 5 & 3 <= y <= 4) | G[0,40] F[0,9] (6 <= x <= 7 & 6 <= y <= 7)"
             ),
@@ -103,7 +105,9 @@ STUDIES = {study.name: study for study in (CASE_STUDY_1, CASE_STUDY_2)}
 """All studies by name."""
 
 
-def find_study(name: str, *, quick: bool = False, runs: int | None = None, seed: int = 0) -> StudySpec:
+def find_study(
+    name: str, *, quick: bool = False, runs: int | None = None, seed: int = 0, protocol: str = "paper"
+) -> StudySpec:
     """The specification of a study by name.
 
     Args:
@@ -111,11 +115,13 @@ def find_study(name: str, *, quick: bool = False, runs: int | None = None, seed:
         quick: Whether to cut it short.
         runs: Independent runs; None for the study's own number.
         seed: The root seed.
+        protocol: One of `tickwise.experiments.study.PROTOCOLS`: whose formulas the methods learn with.
 
     Raises:
-        ConfigurationError: If there is no such study, or a number is out of range.
+        ConfigurationError: If there is no such study or protocol, or a number is out of range.
     """
-    pair = find_pair(name, seed, runs)
+    check_protocol(protocol)
+    pair = find_pair(name, seed, runs, protocol)
     if pair is not None:
         return pair
     if name not in STUDIES:
@@ -127,4 +133,4 @@ def find_study(name: str, *, quick: bool = False, runs: int | None = None, seed:
     if seed < 0:
         raise ConfigurationError(f"the seed is {seed}; use 0 or more")
     spec = STUDIES[name].quick() if quick else STUDIES[name]
-    return replace(spec, seed=seed, runs=spec.runs if runs is None else runs)
+    return replace(spec, seed=seed, protocol=protocol, runs=spec.runs if runs is None else runs)

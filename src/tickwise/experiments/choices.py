@@ -168,6 +168,7 @@ def _inference(spec: StudySpec) -> tuple[Choice, ...]:
             "Less the disjuncts that it is satisfying without. Where it is not satisfying, the operators of the tree's "
             "formula are kept and all parameters optimised together, as in the target.",
         ),
+        _full(spec),
         Choice(
             "Negated primitives",
             "A primitive may be the negation of a structure.",
@@ -180,6 +181,24 @@ def _inference(spec: StudySpec) -> tuple[Choice, ...]:
             f"Those of the first collection, in all {spec.runs} learning runs; what the other collections give is "
             "shown under robustness.",
         ),
+    )
+
+
+def _full(spec: StudySpec) -> Choice:
+    sampled, rate = spec.collection.negatives, spec.inference.rate
+    learned = (
+        "The methods learn with its formulas."
+        if spec.protocol == "full"
+        else "The methods do not learn with its formulas, unless --protocol full is asked for."
+    )
+    return Choice(
+        "The full protocol, beside the paper’s",
+        f"Inference sees {sampled} of the trajectories with label −1, and finds the primitives one by one with a "
+        "particle swarm.",
+        "Inference sees all of them, and searches exactly, all primitives together. An error among more trajectories "
+        f"is a smaller share; so that it counts what it counts among {sampled}, P trajectories with label 1 and N "
+        f"with −1 have the rate 1 − (1 − {rate:g}) s and the weight {spec.inference.information_weight:g} s, where "
+        f"s = (P + {sampled}) / (P + N), in each task its own. {learned}",
     )
 
 

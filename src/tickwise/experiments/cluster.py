@@ -199,7 +199,9 @@ class _Link:
 
     def send(self, task: Task) -> None:
         """Send a task with what it needs."""
-        inputs = [(found.name, found.manifest, found.arrays) for found in map(task.store.get, task.job.needs)]
+        inputs = [
+            (found.name, found.manifest, found.arrays) for found in map(task.store.get, task.job.needs(task.spec))
+        ]
         key = f"{task.job.kind}-{uuid4().hex}"
         asked = request(task.job, task.spec)
         with _or_lost():

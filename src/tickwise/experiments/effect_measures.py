@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tickwise.envs.planning import optimal_value
-from tickwise.experiments.jobs import Job, environment_of, labelled_data
+from tickwise.experiments.inferences import labelled_data
+from tickwise.experiments.job import Job
 from tickwise.experiments.measures import final_mean
 from tickwise.experiments.regions import boxes_of, overlap
 from tickwise.experiments.store import Store
-from tickwise.experiments.study import StudySpec
+from tickwise.experiments.study import StudySpec, environment_of
 from tickwise.inference.tree import classification_rate
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, to_sdnf
@@ -123,7 +124,7 @@ def _disjuncts(finished: Finished) -> float:
 
 def _structure_found(finished: Finished) -> float:
     formula = finished.formula("source")
-    return float(formula is not None and structure(formula) == structure(parse(finished.spec.reference)))
+    return float(formula is not None and structure(formula) == structure(parse(finished.spec.true["source"])))
 
 
 def _transferable(finished: Finished) -> float:

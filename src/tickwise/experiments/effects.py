@@ -107,11 +107,11 @@ def effect_units(
 
 
 def _short(effect: Effect, spec: StudySpec) -> StudySpec:
-    """A study with no more learning than is measured."""
+    """A study with no more inference and learning than is measured: effects are those of the paper's protocol."""
     window = spec.learning.window
     most = {method: episodes or window for method, episodes in effect.episodes.items()}
     steps = ((0, max(most.values(), default=window)),)
-    return replace(spec, learning=replace(spec.learning, most_episodes=most, evaluation_steps=steps))
+    return replace(spec, full=0, learning=replace(spec.learning, most_episodes=most, evaluation_steps=steps))
 
 
 def effect_results(effect: Effect, units: Sequence[Unit], stores: Sequence[Store]) -> dict[str, Any]:

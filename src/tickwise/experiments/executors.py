@@ -15,7 +15,8 @@ from multiprocessing import active_children, get_context
 from typing import Any, Protocol
 
 from tickwise.errors import ConfigurationError, TickwiseError
-from tickwise.experiments.jobs import Job, perform
+from tickwise.experiments.job import Job
+from tickwise.experiments.jobs import perform
 from tickwise.experiments.progress import Board
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import StudySpec

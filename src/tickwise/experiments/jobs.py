@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cache
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -13,81 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise._seeding import generator, seed_sequence
-from tickwise.envs.catalog import EnvironmentSpec
-from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.planning import optimal_value
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.experiments.artefacts import Artefact, Artefacts
+from tickwise.experiments.inferences import infer, study_formulas
+from tickwise.experiments.job import Job, Outcome, Report
 from tickwise.experiments.measures import block_means, goal_reached
 from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.store import Store
-from tickwise.experiments.study import Collection, StudySpec
-from tickwise.inference.fit import Fit
-from tickwise.inference.information import information_gain
-from tickwise.inference.prior import PathPrior
-from tickwise.inference.space import SearchSpace
-from tickwise.inference.swarm import SwarmSettings
-from tickwise.inference.template import fit_transferable
-from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.inference.tree import DecisionTree, InferenceSettings, classification_rate
-from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import SDNF, to_sdnf
+from tickwise.experiments.study import Collection, StudySpec, environment_of
 from tickwise.rl.qlearning import Problem, collect, evaluate, learn
 from tickwise.rl.states import automaton_memory, disjunct_choice, tau_memory
-from tickwise.transfer.hypothesis import PARTS, Task, tick_tables, transfer_structure
+from tickwise.transfer.hypothesis import tick_tables
 from tickwise.transfer.qtransfer import transfer_q
-
-Report = Callable[[int, int], None]
-"""Told how much of a job is done, and out of how much."""
-
-
-@dataclass(frozen=True, slots=True)
-class Job:
-    """A piece of work: its kind, what it is about, and the run.
-
-    Attributes:
-        kind: ``collect``, ``infer`` or ``learn``.
-        subject: The task ``source`` or ``target`` of a collection, or what learns: ``source``, ``I`` … ``IV``.
-        run: The number of the run, from 0.
-    """
-
-    kind: str
-    subject: str
-    run: int
-
-    @property
-    def name(self) -> str:
-        """The name of the artefact."""
-        return "-".join(part for part in (self.kind, self.subject, str(self.run)) if part)
-
-    @property
-    def title(self) -> str:
-        """What a person reads while it runs."""
-        what = {
-            "collect": f"collect in the {self.subject} task",
-            "infer": "infer formulas",
-            "learn": "learn the source task" if self.subject == "source" else f"Method {self.subject}",
-        }
-        return f"{what[self.kind]}, run {self.run + 1}"
-
-    @property
-    def unit(self) -> str:
-        """What its progress counts."""
-        return "formulas" if self.kind == "infer" else "episodes"
-
-    @property
-    def needs(self) -> tuple[str, ...]:
-        """The names of the artefacts that it is made from."""
-        if self.kind == "infer":
-            return tuple(Job("collect", task, self.run).name for task in ("source", "target"))
-        if self.kind == "collect" or self.subject == "I":
-            return ()
-        learned = (Job("learn", "source", self.run).name,) if self.subject == "IV" else ()
-        return (_FORMULAS.name, *learned)
-
-
-_FORMULAS = Job("infer", "", 0)
-"""All runs learn with the formulas of the first collection, as the paper has one of each."""
 
 
 def perform(job: Job, spec: StudySpec, store: Store, report: Report) -> None:
@@ -115,16 +52,7 @@ def compute(job: Job, spec: StudySpec, artefacts: Artefacts, report: Report) -> 
     return Artefact.pack(f"cost-{job.name}", cost, {}), Artefact.pack(job.name, outcome.manifest, outcome.arrays)
 
 
-@dataclass(frozen=True, slots=True)
-class _Outcome:
-    """What a job gave, apart from what else it cost than time and memory as a whole."""
-
-    manifest: dict[str, Any]
-    arrays: dict[str, NDArray[Any]] = field(default_factory=dict)
-    cost: dict[str, Any] = field(default_factory=dict)
-
-
-def _collect(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outcome:
+def _collect(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outcome:
     """The data collection phase (Section IV-A): label the first episodes of Q-learning on τ-states."""
     del store
     phase = spec.collection
@@ -149,7 +77,8 @@ def _collect(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Ou
         paths.append(part[1])
         episodes += count
         positives += int(desired(phase, *part).sum())
-    return _labelled(job, phase, np.concatenate(returns), np.concatenate(paths), rng)
+    everything = np.concatenate(paths).astype(np.min_scalar_type(-mdp.n_states))
+    return _labelled(job, spec, np.concatenate(returns), everything, rng)
 
 
 def desired(phase: Collection, returns: NDArray[np.float32], paths: NDArray[np.int32]) -> NDArray[np.bool_]:
@@ -160,9 +89,17 @@ def desired(phase: Collection, returns: NDArray[np.float32], paths: NDArray[np.i
 
 
 def _labelled(
-    job: Job, phase: Collection, returns: NDArray[np.float32], paths: NDArray[np.int32], rng: np.random.Generator
-) -> _Outcome:
-    """All trajectories with label 1, and some of the others at random, which get label -1."""
+    job: Job,
+    spec: StudySpec,
+    returns: NDArray[np.float32],
+    paths: NDArray[np.signedinteger[Any]],
+    rng: np.random.Generator,
+) -> Outcome:
+    """All trajectories with label 1, and some of the others at random, which get label -1.
+
+    The rest of the others is kept where the full protocol infers from it, in an integer type as small as will do.
+    """
+    phase = spec.collection
     good = desired(phase, returns, paths)
     positive, other = np.flatnonzero(good), np.flatnonzero(~good)
     if not len(positive):
@@ -179,150 +116,10 @@ def _labelled(
         "episodes": len(returns), "of_the_first": phase.episodes,
         "positives_of_the_first": int(good[: phase.episodes].sum()),
     }  # fmt: skip
-    return _Outcome(facts, {"paths": paths[picked], "labels": labels})
-
-
-def labelled_data(spec: StudySpec, store: Artefacts, task: str, run: int) -> LabelledTrajectories:
-    """The labelled trajectories of a collection; the state is the robot's position.
-
-    Where label 1 is for lasting long, the last state of these trajectories is left out (Case Study 2). Where there
-    is to be noise, labels are turned round after that.
-    """
-    mdp = environment_of(spec, task).mdp()
-    content = store.load(Job("collect", task, run).name)
-    paths, labels = content["paths"], content["labels"]
-    lengths = (paths >= 0).sum(axis=1)
-    values = np.where(paths[..., None] >= 0, mdp.coordinates[paths], np.nan)
-    ids = tuple(str(number) for number in range(len(paths)))
-    data = LabelledTrajectories(values, lengths, labels, mdp.variables, ids)
-    data = data if spec.collection.least_ticks is None else data.drop_last(labels == 1)
-    wrong = round(spec.collection.noise * len(data))
-    if not wrong:
-        return data
-    rng = generator(spec.seed, spec.name, "noise", task, run)
-    turned = np.isin(np.arange(len(data)), rng.choice(len(data), wrong, replace=False))
-    return replace(data, labels=np.where(turned, -data.labels, data.labels))
-
-
-def environment_of(spec: StudySpec, task: str) -> EnvironmentSpec:
-    """The environment of ``source`` or ``target``."""
-    return spec.source if task == "source" else spec.target
-
-
-def inference_task(spec: StudySpec, store: Artefacts, task: str, run: int) -> Task:
-    """What inference needs: the data, the uniform prior over the MDP's paths, and whole cells as regions."""
-    environment = environment_of(spec, task)
-    mdp, horizon = environment.mdp(), environment.task.deadline
-    prior = PathPrior(mdp.support_graph(), mdp.coordinates, variables=mdp.variables, horizon=horizon)
-    space = SearchSpace.grid(environment.world.size, horizon, mdp.variables)
-    return Task(labelled_data(spec, store, task, run), prior, space)
-
-
-STEPS = (*PARTS, "plain")
-"""What an inference consists of: the parts of Steps 1 and 2, and Step 2 without the information gain."""
-
-
-def _infer(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outcome:
-    """Steps 1 and 2 (Section IV-B), and φ'^T, which is Step 2 without the information gain.
-
-    φ'^T is Method II's, and is left out with it. The cost has the processor time in seconds of each of `STEPS` that
-    was taken: it depends less than the time on the wall on what else the machine does.
-    """
-    source, target = (inference_task(spec, store, task, job.run) for task in ("source", "target"))
-    rngs = [generator(spec.seed, spec.name, "infer", what, job.run) for what in ("source", "target", "plain")]
-    report(0, len(STEPS))
-    _compile_inference()
-    marks = [time.thread_time()]
-
-    def done(step: str) -> None:
-        marks.append(time.thread_time())
-        report(STEPS.index(step) + 1, len(STEPS))
-
-    found = transfer_structure(source, target, spec.inference, spec.swarm, rngs[0], rngs[1], done)
-    manifest: dict[str, Any] = {
-        "run": job.run,
-        "source": {
-            **_formula_facts(found.source, source, spec.inference),
-            "satisfying": found.source_satisfying,
-            "tree": _tree(found.tree),
-        },
-        "target": {
-            "formula": _text(found.target),
-            "transferable": found.transferable,
-            "reason": found.reason,
-            "attempts": [_fit(attempt) for attempt in found.fit.attempts] if found.fit else [],
-        },
-        "target_without_information": None,
-    }
-    if found.source is not None and found.source_satisfying and "II" in spec.learning.most_episodes:
-        plain = replace(spec.inference, information_weight=0.0)
-        fit = fit_transferable(target.data, target.prior, target.space, found.source, plain, spec.swarm, rngs[2])
-        manifest["target_without_information"] = _fit(fit.attempts[-1])
-        done("plain")
-    seconds = {name: round(now - before, 4) for name, (before, now) in zip(STEPS, pairwise(marks), strict=False)}
-    return _Outcome(manifest, cost={"step_seconds": seconds})
-
-
-@cache
-def _compile_inference() -> None:
-    """Infer from next to nothing, once a process: what is timed after it has nothing left to compile or to load."""
-    mdp = GridWorld(2).mdp()
-    values = np.repeat(mdp.coordinates[[0, 0, -1, -1], None], 13, axis=1)
-    names = tuple("abcd")
-    data = LabelledTrajectories(values, np.full(4, 13), np.array([1, 1, -1, -1], np.int8), mdp.variables, names)
-    prior = PathPrior(mdp.support_graph(), mdp.coordinates, variables=mdp.variables, horizon=12)
-    task = Task(data, prior, SearchSpace.grid(2, 12, mdp.variables))
-    swarm = SwarmSettings(particles=4, iterations=2, restarts=1, climbers=1)
-    settings = InferenceSettings(size=4, rate=1.0, depth=1)
-    transfer_structure(task, task, settings, swarm, np.random.default_rng(0), np.random.default_rng(0))
-
-
-def _text(formula: SDNF | None) -> str | None:
-    return None if formula is None else str(formula)
-
-
-def _fit(fit: Fit) -> dict[str, Any]:
-    return {
-        "formula": str(fit.formula), "rate": fit.rate, "gain": fit.gain, "size": fit.size,
-        "satisfying": fit.satisfying,
-    }  # fmt: skip
-
-
-def _formula_facts(formula: SDNF | None, task: Task, settings: InferenceSettings) -> dict[str, Any]:
-    if formula is None:
-        return {"formula": None, "rate": None, "gain": None, "size": None}
-    rate = classification_rate(formula, task.data, settings.class_weight)
-    gain = information_gain(formula, task.prior)
-    return {"formula": str(formula), "rate": rate, "gain": gain, "size": formula.size}
-
-
-def _tree(node: DecisionTree | None) -> dict[str, Any] | None:
-    if node is None:
-        return None
-    path = node.path_formula
-    inner = node.primitive is not None
-    return {
-        "label": node.label, "formula": str(node.primitive) if inner else None,
-        "path": "true" if path is None else str(path),
-        "positives": node.positives, "negatives": node.negatives, "stop": node.stop,
-        "objective": node.objective if inner else None, "rate": node.rate if inner else None,
-        "gain": node.gain if inner else None, "left": _tree(node.left), "right": _tree(node.right),
-    }  # fmt: skip
-
-
-def study_formulas(store: Artefacts) -> dict[str, SDNF | None]:
-    """The formulas that all runs learn with.
-
-    φ^T and φ'^T are None where they are not satisfying formulas of the target task (Problem 1).
-    """
-    found = store.load(_FORMULAS.name)
-    plain = found["target_without_information"]
-    texts = {
-        "source": found["source"]["formula"],
-        "target": found["target"]["formula"],
-        "target_without_information": plain["formula"] if plain and plain["satisfying"] else None,
-    }
-    return {name: None if text is None else to_sdnf(parse(text)) for name, text in texts.items()}
+    arrays: dict[str, NDArray[Any]] = {"paths": paths[picked].astype(np.int32), "labels": labels}
+    if job.run in spec.inferred("full"):
+        arrays["rest"] = paths[np.setdiff1d(other, chosen)]
+    return Outcome(facts, arrays)
 
 
 def learning_problem(spec: StudySpec, store: Artefacts, subject: str) -> Problem:
@@ -336,7 +133,7 @@ def learning_problem(spec: StudySpec, store: Artefacts, subject: str) -> Problem
     if subject == "I":
         return Problem(mdp, environment.task_table(), tau_memory(mdp, spec.collection.tau))
     names = {"source": "source", "II": "target_without_information", "III": "target", "IV": "target"}
-    formula = study_formulas(store)[names[subject]]
+    formula = study_formulas(spec, store)[names[subject]]
     if formula is None:
         raise ConfigurationError(f"{subject} needs a formula, and none was inferred; leave it out")
     tables = tick_tables(formula, environment.task.deadline)
@@ -354,7 +151,7 @@ def evaluation_points(spec: StudySpec, episodes: int) -> list[int]:
     return points
 
 
-def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outcome:
+def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outcome:
     """Q-learning (Step 3) of the source task or of one of Methods I to IV, with evaluations on fixed seeds."""
     learning, subject = spec.learning, job.subject
     settings = learning.source if subject == "source" else learning.settings
@@ -383,11 +180,11 @@ def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> _Outc
     if subject == "source":
         arrays["q"] = q
     goal = goal_reached(returns, learning.goal, optimal_value(problem.mdp, problem.task))
-    return _Outcome({"run": job.run, "episodes": episodes, "goal": goal}, arrays)
+    return Outcome({"run": job.run, "episodes": episodes, "goal": goal}, arrays)
 
 
-_KINDS: dict[str, Callable[[Job, StudySpec, Artefacts, Report], _Outcome]] = {
+_KINDS: dict[str, Callable[[Job, StudySpec, Artefacts, Report], Outcome]] = {
     "collect": _collect,
-    "infer": _infer,
+    "infer": infer,
     "learn": _learn,
 }

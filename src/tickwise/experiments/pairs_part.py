@@ -25,7 +25,7 @@ _SECTIONS = {
     "pairs": "Every pair",
     "pair-settings": "Settings",
 }
-_OF_EACH = ("name", "title", "source", "target", "reference", "similar", "remarks", "published")
+_OF_EACH = ("name", "title", "source", "target", "true", "similar", "remarks", "published")
 
 
 def pairs_part(results: Mapping[str, Any], specs: Sequence[StudySpec], figure: str, command: str) -> Part:

@@ -19,12 +19,14 @@ from tickwise.experiments.figures import draw_effect, draw_figures, draw_pairs
 from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.pairs import gather_pairs
 from tickwise.experiments.pairs_part import pairs_part
+from tickwise.experiments.protocols import inference_seconds
 from tickwise.experiments.report import Part, render_page, study_part
 from tickwise.experiments.runner import Unit, planned_jobs, unfinished
 from tickwise.experiments.store import Store, read_configuration, read_json, write_json, write_text
 from tickwise.experiments.study import StudySpec
 from tickwise.experiments.suites import Suite, Units, suite_of
 from tickwise.experiments.summary import command, gather
+from tickwise.experiments.tables import TIMES
 
 PACKAGES = ("numpy", "numba", "scipy", "gymnasium", "matplotlib")
 """Packages whose versions a report names."""
@@ -86,7 +88,8 @@ def republish(folder: Path) -> dict[str, Any]:
     if "suite" in config:
         return _republish_suite(suite_of(config, folder), folder)
     try:
-        spec = find_study(config["name"], quick=config["short"], runs=config["runs"], seed=config["seed"])
+        asked = {"quick": config["short"], **{key: config[key] for key in ("runs", "seed", "protocol")}}
+        spec = find_study(config["name"], **asked)
     except KeyError as error:
         raise StoreError(
             f"{folder / 'config.json'} holds no configuration of a run (there is no {error}); name another folder"
@@ -156,9 +159,10 @@ def _publish_study(spec: StudySpec, store: Store, environment: dict[str, Any]) -
 def _study(spec: StudySpec, store: Store, environment: dict[str, Any], *, nested: bool) -> tuple[dict[str, Any], Part]:
     """A study's summary and figures, which are also written, and its part of a page."""
     results = gather(spec, store, environment["version"])
-    results["environment"] = environment
+    results |= {"environment": environment, "seconds": inference_seconds(spec, store)}
     summary: dict[str, Any] = results["summary"]
     write_json(store.folder / "summary.json", summary)
+    write_json(store.folder / TIMES, results["seconds"])
     figures = draw_figures(results, spec, store.folder / "figures")
     return summary, study_part(results, spec, figures, nested=nested)
 

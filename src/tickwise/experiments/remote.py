@@ -15,7 +15,7 @@ from tickwise.experiments.identity import difference, identity
 from tickwise.experiments.plain import from_plain, to_plain
 
 if TYPE_CHECKING:
-    from tickwise.experiments.jobs import Job
+    from tickwise.experiments.job import Job
     from tickwise.experiments.study import StudySpec
 
 Sent = tuple[str, bytes, bytes | None]

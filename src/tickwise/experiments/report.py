@@ -13,6 +13,7 @@ from markupsafe import Markup
 from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.experiments.captions import captions
 from tickwise.experiments.choices import capital, choices, signed
+from tickwise.experiments.protocol_rows import inference_rows, protocol_rows
 from tickwise.experiments.regions import NamedFormula, overlap, ranges_text, read_formula
 from tickwise.experiments.study import StudySpec
 from tickwise.experiments.verdict import count, headline, published, verdict
@@ -30,8 +31,8 @@ _TITLES = {
     "target_without_information": "Target task without the information gain (λ = 0)",
 }
 _SECTIONS = {
-    "transferability": "Transferability", "formulas": "Formulas", "learning": "Learning", "data": "Data",
-    "robustness": "Robustness", "choices": "Choices", "settings": "Settings",
+    "transferability": "Transferability", "formulas": "Formulas", "protocols": "Protocols", "learning": "Learning",
+    "data": "Data", "robustness": "Robustness", "choices": "Choices", "settings": "Settings",
 }  # fmt: skip
 _METHODS = {
     "I": "Q-learning on τ-states",
@@ -128,6 +129,8 @@ def study_part(
         fail=signed(summary["fail"]),
         collections=results["collections"],
         robustness=[_robust_row(inference, spec) for inference in results["inferences"]],
+        protocols=protocol_rows(summary["protocols"], results["seconds"]),
+        by_protocol=inference_rows(summary["protocols"], results["seconds"], spec),
         figures=_figures(spec, figures, prefix),
         settings=settings_tree(spec.as_dict()),
         choices=choices(spec),

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tickwise.experiments.executors import Executor, Local, Run, Task, interruptible
-from tickwise.experiments.jobs import Job, study_formulas
+from tickwise.experiments.inferences import study_formulas
+from tickwise.experiments.job import Job, inference_job
 from tickwise.experiments.progress import Display, Item, board
 from tickwise.experiments.store import Store
-from tickwise.experiments.study import StudySpec
+from tickwise.experiments.study import PROTOCOLS, StudySpec
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +97,7 @@ def available_methods(spec: StudySpec, store: Store) -> tuple[str, ...]:
 
     Method I needs no formula; II needs φ'^T, III and IV need φ^T, and so logical transferability.
     """
-    formulas = study_formulas(store)
+    formulas = study_formulas(spec, store)
     needed = {"II": "target_without_information", "III": "target", "IV": "target"}
     return tuple(
         method for method in spec.learning.most_episodes if method not in needed or formulas[needed[method]] is not None
@@ -121,7 +122,7 @@ def unfinished(spec: StudySpec, store: Store) -> Job | None:
 def _preparation(spec: StudySpec) -> list[_Phase]:
     return [
         ("Collect", _jobs("collect", ("source", "target"), spec.inferences)),
-        ("Infer", _jobs("infer", ("",), spec.inferences)),
+        ("Infer", [inference_job(protocol, run) for protocol in PROTOCOLS for run in spec.inferred(protocol)]),
     ]
 
 

@@ -6,12 +6,20 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from tickwise.envs.catalog import EnvironmentSpec
+from tickwise.errors import ConfigurationError
+from tickwise.inference.exact import ExactSettings
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.tree import InferenceSettings
 from tickwise.rl.qlearning import QSettings
 
 METHODS = ("I", "II", "III", "IV")
 """The methods of Section V: τ-states; the formula without information gain; the formula; with transferred values."""
+
+PROTOCOLS = {
+    "paper": "200 random negatives, a particle swarm, primitives one by one",
+    "full": "all negatives, an exact search, primitives together",
+}
+"""How formulas are inferred, as the paper does it and with all there is, and what each is in a few words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,12 +159,16 @@ class StudySpec:
         inference: The constraints of Problem 1 and the settings of Algorithm 1.
         swarm: The settings of the particle swarm.
         learning: Learning and evaluation.
-        reference: A formula with the structure that the source task has.
+        true: ``source`` and ``target``: for each task a formula that says what it asks for. Its operators and regions
+            are the true ones; its times are one choice of several.
         published: What the paper reports of it.
         similar: Whether the target task is known to be similar to the source task.
         remarks: What else the study's author chose: what it is about, what the paper says of it, and the choice.
         runs: Independent runs.
         collections: Collections that formulas are inferred from; None for as many as there are runs.
+        protocol: One of `PROTOCOLS`: which formulas the methods learn with.
+        exact: The search of the full protocol.
+        full: Of these collections, those that the full protocol infers from too; None for all of them.
         seed: The root seed.
         short: Whether it was cut short to be looked at within minutes.
     """
@@ -169,12 +181,15 @@ class StudySpec:
     inference: InferenceSettings
     swarm: SwarmSettings
     learning: Learning
-    reference: str
+    true: dict[str, str]
     published: Published = field(default_factory=Published)
     similar: bool = True
     remarks: tuple[tuple[str, str, str], ...] = ()
     runs: int = 10
     collections: int | None = None
+    protocol: str = "paper"
+    exact: ExactSettings = field(default_factory=lambda: ExactSettings(joint=True))
+    full: int | None = None
     seed: int = 0
     short: bool = False
 
@@ -182,6 +197,11 @@ class StudySpec:
     def inferences(self) -> range:
         """The numbers of the collections that formulas are inferred from."""
         return range(self.runs if self.collections is None else self.collections)
+
+    def inferred(self, protocol: str) -> range:
+        """The numbers of the collections that formulas are inferred from by one of `PROTOCOLS`."""
+        every = self.inferences
+        return every if protocol == "paper" or self.full is None else every[: self.full]
 
     def as_dict(self) -> dict[str, Any]:
         """The specification as plain data, as it goes into a run folder and a report."""
@@ -191,4 +211,45 @@ class StudySpec:
         """The same study with fewer runs and episodes, to look at within minutes."""
         limits = {"I": 100_000, "II": 100_000, "III": 50_000, "IV": 50_000}
         most = {method: min(most, limits[method]) for method, most in self.learning.most_episodes.items()}
-        return replace(self, runs=3, short=True, learning=replace(self.learning, most_episodes=most))
+        return replace(self, runs=3, full=1, short=True, learning=replace(self.learning, most_episodes=most))
+
+
+def check_protocol(protocol: str) -> None:
+    """Refuse a name that is none of `PROTOCOLS`.
+
+    Raises:
+        ConfigurationError: If it is not.
+    """
+    if protocol not in PROTOCOLS:
+        raise ConfigurationError(f"there is no protocol {protocol!r}; choose {' or '.join(PROTOCOLS)}")
+
+
+def environment_of(spec: StudySpec, task: str) -> EnvironmentSpec:
+    """The environment of ``source`` or ``target``."""
+    return spec.source if task == "source" else spec.target
+
+
+def full_settings(settings: InferenceSettings, positives: int, negatives: int, sampled: int) -> InferenceSettings:
+    """The constants of Problem 1 for all trajectories, so that an error counts what it counts among a sample.
+
+    Among P trajectories with label 1 and all N with label -1, instead of n of these, an error is a smaller share: with
+    P = 40, n = 200 and N = 16,000, ζ = 0.95 allows 12 errors of 240, but 802 of 16,040, where a formula that is always
+    false would do. With the share s = (P + n) / (P + N), the rate 1 - (1 - ζ) s allows as many errors as before, and
+    the weight λ s leaves the price of an error, in information, as it was.
+
+    Args:
+        settings: Those for the sample.
+        positives: P.
+        negatives: N, all trajectories with label -1.
+        sampled: n, as many of them as a sample has.
+
+    Returns:
+        The settings for one task; they differ from task to task, as P and N do. No label has a weight.
+    """
+    share = (positives + min(sampled, negatives)) / (positives + negatives)
+    return replace(
+        settings,
+        rate=1 - (1 - settings.rate) * share,
+        information_weight=settings.information_weight * share,
+        class_weight=None,
+    )

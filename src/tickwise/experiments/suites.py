@@ -13,7 +13,7 @@ from tickwise.experiments.effect_catalog import EFFECTS, find_effect
 from tickwise.experiments.effects import Effect, effect_units
 from tickwise.experiments.random_pairs import random_pairs
 from tickwise.experiments.runner import Unit
-from tickwise.experiments.study import StudySpec
+from tickwise.experiments.study import StudySpec, check_protocol
 
 TITLES = {
     "random": "Random pairs of tasks",
@@ -41,6 +41,7 @@ class Suite:
         short: Whether it is cut short to be looked at within minutes.
         effect: The name of the effect, where the suite is a single one.
         study: The study that the effect is measured on; None for its own.
+        protocol: Whose formulas the methods of studies and pairs learn with; effects are those of the paper's.
     """
 
     name: str
@@ -50,6 +51,7 @@ class Suite:
     short: bool = False
     effect: str | None = None
     study: str | None = None
+    protocol: str = "paper"
 
     @property
     def title(self) -> str:
@@ -63,14 +65,17 @@ class Suite:
             what = f"reproduce {self.name} --tasks {self.tasks}"
         else:
             what = f"effect {self.effect}" + ("" if self.study is None else f" --study {self.study}")
-        options = ["--quick"] * self.short + ([] if self.runs is None else [f"--runs {self.runs}"])
+        options = [f"--protocol {self.protocol}"] * (self.protocol != "paper") + ["--quick"] * self.short
+        options += [] if self.runs is None else [f"--runs {self.runs}"]
         return " ".join(["tickwise", what, *options, f"--seed {self.seed}"])
 
     @property
     def studies(self) -> tuple[StudySpec, ...]:
         """The studies that are reported one by one."""
         names = tuple(STUDIES) if self.name == "all" else ()
-        return tuple(find_study(name, quick=self.short, runs=self.runs, seed=self.seed) for name in names)
+        return tuple(
+            find_study(name, quick=self.short, runs=self.runs, seed=self.seed, protocol=self.protocol) for name in names
+        )
 
     @property
     def effects(self) -> tuple[Effect, ...]:
@@ -90,7 +95,7 @@ class Suite:
             studies=tuple(Unit(spec.name, spec, folder / spec.name) for spec in self.studies),
             pairs=tuple(
                 Unit(spec.name, spec, folder / "pairs" / spec.name)
-                for spec in random_pairs(self.tasks, self.seed, runs=runs)
+                for spec in random_pairs(self.tasks, self.seed, runs=runs, protocol=self.protocol)
             ),
             effects={
                 effect.name: tuple(self._variations(effect, folder / "effects" / effect.name))
@@ -106,7 +111,7 @@ class Suite:
         """What was asked for, as plain data, as it goes into the run folder."""
         return {
             "suite": self.name, "effect": self.effect, "study": self.study, "tasks": self.tasks, "runs": self.runs,
-            "seed": self.seed, "short": self.short,
+            "seed": self.seed, "short": self.short, "protocol": self.protocol,
         }  # fmt: skip
 
 
@@ -131,7 +136,13 @@ class Units:
 
 
 def find_suite(
-    name: str, *, tasks: int | None = None, runs: int | None = None, seed: int = 0, quick: bool = False
+    name: str,
+    *,
+    tasks: int | None = None,
+    runs: int | None = None,
+    seed: int = 0,
+    quick: bool = False,
+    protocol: str = "paper",
 ) -> Suite:
     """The suite of a name.
 
@@ -141,9 +152,10 @@ def find_suite(
         runs: Independent runs of each study; None for each one's own number.
         seed: The root seed.
         quick: Whether to cut it short.
+        protocol: One of `tickwise.experiments.study.PROTOCOLS`.
 
     Raises:
-        ConfigurationError: If there is no such suite, or a number is out of range.
+        ConfigurationError: If there is no such suite or protocol, or a number is out of range.
     """
     if name not in ("random", "all"):
         raise ConfigurationError(f"there is no suite {name!r}; choose random or all")
@@ -151,7 +163,8 @@ def find_suite(
     if count < 1:
         raise ConfigurationError(f"a suite of {count} random tasks shows nothing; use --tasks 1 or more")
     _check_numbers(runs, seed)
-    return Suite(name, count, runs, seed, quick)
+    check_protocol(protocol)
+    return Suite(name, count, runs, seed, quick, protocol=protocol)
 
 
 def effect_suite(
@@ -197,7 +210,8 @@ def suite_of(configuration: Mapping[str, Any], folder: Path) -> Suite:
         shared = {"runs": configuration["runs"], "seed": configuration["seed"], "quick": configuration["short"]}
         if configuration["effect"] is not None:
             return effect_suite(configuration["effect"], study=configuration["study"], **shared)
-        return find_suite(configuration["suite"], tasks=configuration["tasks"], **shared)
+        asked = {"tasks": configuration["tasks"], "protocol": configuration["protocol"]}
+        return find_suite(configuration["suite"], **asked, **shared)
     except KeyError as error:
         raise StoreError(
             f"{folder / 'config.json'} holds no configuration of a suite (there is no {error}); name another folder"

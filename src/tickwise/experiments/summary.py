@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from tickwise.envs.planning import optimal_value, worst_value
-from tickwise.experiments.jobs import Job, environment_of, labelled_data, study_formulas
+from tickwise.experiments.inferences import labelled_data, study_formulas
+from tickwise.experiments.job import Job, inference_job
 from tickwise.experiments.measures import (
     LEVELS,
     episode_statistics,
@@ -16,24 +17,22 @@ from tickwise.experiments.measures import (
     settled,
     stays,
 )
-from tickwise.experiments.regions import boxes_of, overlap
+from tickwise.experiments.protocols import TASKS, exact_regions, gather_protocols
 from tickwise.experiments.runner import available_methods
 from tickwise.experiments.store import Store
-from tickwise.experiments.study import StudySpec
+from tickwise.experiments.study import StudySpec, environment_of
 from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import to_sdnf
 from tickwise.logic.structure import structure
 
 PAIRS = (("I", "III"), ("III", "IV"))
 """Methods whose episodes to convergence are compared: the paper's one order of magnitude, and the next."""
 
-TASKS = ("source", "target")
-
 
 def command(spec: StudySpec) -> str:
     """The command line that gives the study's numbers, whatever the folder and the number of workers."""
     quick = " --quick" if spec.short else ""
-    return f"tickwise reproduce {spec.name}{quick} --runs {spec.runs} --seed {spec.seed}"
+    protocol = "" if spec.protocol == "paper" else f" --protocol {spec.protocol}"
+    return f"tickwise reproduce {spec.name}{protocol}{quick} --runs {spec.runs} --seed {spec.seed}"
 
 
 def gather(spec: StudySpec, store: Store, version: str) -> dict[str, Any]:
@@ -54,13 +53,15 @@ def gather(spec: StudySpec, store: Store, version: str) -> dict[str, Any]:
     """
     runs = range(spec.runs)
     collections = [{"run": run, **{task: _counts(store, task, run) for task in TASKS}} for run in spec.inferences]
-    inferences = [store.load(Job("infer", "", run).name) for run in spec.inferences]
+    inferences = [store.load(inference_job(spec.protocol, run).name) for run in spec.inferred(spec.protocol)]
     values = {task: _values(spec, task) for task in TASKS}
     methods = {
         method: [_run(spec, store, method, run, values["target"]) for run in runs]
         for method in available_methods(spec, store)
     }
-    formulas = {name: None if formula is None else str(formula) for name, formula in study_formulas(store).items()}
+    formulas = {
+        name: None if formula is None else str(formula) for name, formula in study_formulas(spec, store).items()
+    }
     summary = {
         "study": spec.name, "quick": spec.short, "seed": spec.seed, "runs": spec.runs, "version": version,
         "command": command(spec), "formulas": formulas,
@@ -69,6 +70,7 @@ def gather(spec: StudySpec, store: Store, version: str) -> dict[str, Any]:
         "v_star": values["target"][0], "fail": values["target"][1], "source_v_star": values["source"][0],
         "methods": {name: _method_summary(spec, results) for name, results in methods.items()},
         "ratios": _ratios(spec, methods), "collections": collections,
+        "protocols": gather_protocols(spec, store, collections),
     }  # fmt: skip
     return {
         "summary": summary,
@@ -87,7 +89,7 @@ def _source_curve(store: Store, run: int) -> dict[str, Any]:
 
 def _counts(store: Store, task: str, run: int) -> dict[str, Any]:
     content = store.load(Job("collect", task, run).name)
-    return {key: value for key, value in content.items() if key not in ("paths", "labels", "run")}
+    return {key: value for key, value in content.items() if key not in ("paths", "labels", "rest", "run")}
 
 
 def _values(spec: StudySpec, task: str) -> tuple[float, float]:
@@ -145,20 +147,14 @@ def _ratios(spec: StudySpec, methods: dict[str, list[dict[str, Any]]]) -> dict[s
 
 def _structures(spec: StudySpec, inferences: list[dict[str, Any]]) -> dict[str, Any]:
     """In how many collections the structure was found, transferability identified, and all regions exact."""
-    wanted = structure(parse(spec.reference))
+    wanted = structure(parse(spec.true["source"]))
     found = [
         text is not None and structure(parse(text)) == wanted
         for text in (inference["source"]["formula"] for inference in inferences)
     ]
     transferable = [bool(inference["target"]["transferable"]) for inference in inferences]
-    exact = {task: sum(_exact(spec, task, inference[task]["formula"]) for inference in inferences) for task in TASKS}
+    exact = {
+        task: sum(exact_regions(inference[task]["formula"], environment_of(spec, task)) for inference in inferences)
+        for task in TASKS
+    }
     return {"found": sum(found), "transferable": sum(transferable), "exact": exact, "of": len(inferences)}
-
-
-def _exact(spec: StudySpec, task: str, formula: str | None) -> bool:
-    """Whether every region of a formula is a true one."""
-    if formula is None:
-        return False
-    environment = environment_of(spec, task)
-    true, size = [landmark.box for landmark in environment.task.landmarks], environment.world.size
-    return all(any(overlap(box, other, size) == 1 for other in true) for box in boxes_of(to_sdnf(parse(formula))))

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from rich.table import Table
 
 from tickwise.experiments.store import read_json
+
+TIMES = "times/inference.json"
+"""In the run folder of a study: what each inference took, which differs each time."""
 
 
 def suite_tables(summary: Mapping[str, Any], folder: Path) -> Iterator[str | Table]:
@@ -20,7 +24,7 @@ def suite_tables(summary: Mapping[str, Any], folder: Path) -> Iterator[str | Tab
     """
     for name, study in summary["studies"].items():
         yield f"== {name}"
-        yield from study_tables(study)
+        yield from study_tables(study, folder / name)
     if "random" in summary:
         yield from _pairs(summary["random"])
     for name, effect in summary["effects"].items():
@@ -52,12 +56,18 @@ def _effect(name: str, effect: Mapping[str, Any], times: Mapping[str, Any]) -> T
     return table
 
 
-def study_tables(summary: Mapping[str, Any]) -> Iterator[str | Table]:
-    """What a study gave: its formulas, and a row a method."""
+def study_tables(summary: Mapping[str, Any], folder: Path) -> Iterator[str | Table]:
+    """What a study gave: its formulas, a row a protocol, and a row a method.
+
+    Args:
+        summary: The study's summary.
+        folder: Its run folder, which has the times that inference took.
+    """
     for name, formula in summary["formulas"].items():
         yield f"{name.replace('_', ' ')}: {formula or 'none'}"
     yield f"logically transferable: {'yes' if summary['transferable'] else 'no'}"
     yield f"reason: {summary['reason']}"
+    yield _protocols(summary["protocols"], read_json(folder / TIMES))
     runs = summary["runs"]
     table = Table(
         title=f"Episodes to converge, mean of {runs} run{'' if runs == 1 else 's'} (V* = {summary['v_star']:.2f})\n"
@@ -78,6 +88,18 @@ def study_tables(summary: Mapping[str, Any]) -> Iterator[str | Table]:
         if found["value"] is not None:
             least = "at least " if found["at_least"] else ""
             yield f"{pair} by the goal: {least}{found['value']:.1f} times fewer episodes"
+
+
+def _protocols(protocols: Mapping[str, Any], seconds: Mapping[str, Sequence[float]]) -> Table:
+    table = Table(title="Collections whose formulas have the true operators and regions exactly", title_justify="left")
+    table.add_column("protocol")
+    for heading in ("source", "target", "both", "transferable", "seconds each"):
+        table.add_column(heading, justify="right")
+    for name, found in protocols.items():
+        counts = (*(found["exact"][key] for key in ("source", "target", "both")), found["transferable"])
+        cells = [f"{count} of {found['of']}" for count in counts]
+        table.add_row(name + ", learned with" * found["chosen"], *cells, f"{median(seconds[name]):.1f}")
+    return table
 
 
 def _episodes(statistics: Mapping[str, Any], runs: int) -> str:

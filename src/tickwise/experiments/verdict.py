@@ -23,7 +23,7 @@ def verdict(summary: Mapping[str, Any], spec: StudySpec) -> list[str]:
     Returns:
         Sentences, each with a full stop.
     """
-    sentences = [_transferability(summary)]
+    sentences = [_transferability(summary), *_exactness(summary["protocols"])]
     for name, subject in (
         ("III", "With the inferred formula's clocks and locations in the state (Method III)"),
         ("IV", "With the source's Q-function transferred as well (Method IV)"),
@@ -64,6 +64,17 @@ def _transferability(summary: Mapping[str, Any]) -> str:
         "Logical transferability was not identified from the first collection, so that nothing was transferred and "
         f"Methods III and IV were not carried out (it was identified from {share})."
     )
+
+
+def _exactness(protocols: Mapping[str, Any]) -> list[str]:
+    """How often both protocols are exactly right, where both were followed."""
+    if len(protocols) < 2:
+        return []
+    paper, full = (f"{found['exact']['both']} of {found['of']}" for found in (protocols["paper"], protocols["full"]))
+    return [
+        "The operators and regions of both formulas are exactly the true ones in "
+        f"{paper} collections by the paper's inference, and in {full} by exact inference from all trajectories."
+    ]
 
 
 def _method(summary: Mapping[str, Any], spec: StudySpec, name: str, subject: str) -> str:

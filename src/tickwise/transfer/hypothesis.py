@@ -10,7 +10,7 @@ import numpy as np
 from tickwise.automata.build import timed_automata
 from tickwise.automata.model import TimedAutomaton
 from tickwise.automata.ticks import TickTable
-from tickwise.errors import NotTransferableError
+from tickwise.errors import DataError, NotTransferableError
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.growth import infer_jointly
 from tickwise.inference.objective import formula_signature
@@ -40,7 +40,7 @@ class Hypothesis:
 
     Attributes:
         tree: The source's decision tree (Algorithm 1); None where all primitives were found together.
-        source: φ^S, or None where the tree has no leaf with label 1.
+        source: φ^S, or None where the tree has no leaf with label 1, or no formula is better than a trivial one.
         source_satisfying: Whether φ^S is a satisfying formula (Problem 1).
         fit: The attempts of Step 2, or None where Step 1 failed.
     """
@@ -64,7 +64,12 @@ class Hypothesis:
     def reason(self) -> str:
         """Why it is or is not, in one sentence."""
         if self.source is None:
-            return "Logical transferability is not identified: no leaf of the source's decision tree has label 1."
+            lacking = (
+                "no formula is better than a trivial one in the source task"
+                if self.tree is None
+                else "no leaf of the source's decision tree has label 1"
+            )
+            return f"Logical transferability is not identified: {lacking}."
         if not self.source_satisfying:
             return "Logical transferability is not identified: the source's formula violates a constraint of Problem 1."
         assert self.fit is not None  # Step 2 ran
@@ -79,6 +84,8 @@ def transfer_structure(
     source_rng: np.random.Generator,
     target_rng: np.random.Generator,
     done: Callable[[str], None] | None = None,
+    *,
+    target_settings: InferenceSettings | None = None,
 ) -> Hypothesis:
     """Infer φ^S by Algorithm 1 (Step 1), then fit a structurally transferable φ^T (Step 2).
 
@@ -90,6 +97,8 @@ def transfer_structure(
         source_rng: Draws of Step 1.
         target_rng: Draws of Step 2.
         done: Told which of `PARTS` is done, each in turn; for who shows progress or measures time.
+        target_settings: The settings of Step 2, where ζ and λ count errors among another number of trajectories than in
+            the source; None for the same.
 
     Returns:
         What was inferred, and whether logical transferability is identified.
@@ -101,16 +110,26 @@ def transfer_structure(
         done("tree")
     formula = source_formula(tree, source, settings, search, source_rng) if tree else None
     if jointly is not None:
-        formula = infer_jointly(*given, jointly).formula
+        formula = _joint_formula(source, settings, jointly)
     satisfying = is_satisfying(formula, source.data, settings)
     if done is not None:
         done("source")
     fit = None
     if formula is not None and satisfying:
-        fit = fit_transferable(target.data, target.prior, target.space, formula, settings, search, target_rng)
+        constants = target_settings or settings
+        fit = fit_transferable(target.data, target.prior, target.space, formula, constants, search, target_rng)
         if done is not None:
             done("target")
     return Hypothesis(tree, formula, satisfying, fit)
+
+
+def _joint_formula(source: Task, settings: InferenceSettings, limits: ExactSettings) -> SDNF | None:
+    """The formula that is found with all primitives together; None where there is no good one."""
+    source.data.require_both_classes()
+    try:
+        return infer_jointly(source.data, source.prior, source.space, settings, limits).formula
+    except DataError:  # both labels are there: no formula is better than a trivial one
+        return None
 
 
 def source_formula(

@@ -47,7 +47,7 @@ def draw(results: Mapping[str, Any], spec: StudySpec) -> Figure:
         _collection(axes, x, collection.get(task, {}), spec)
     source = read_formula(summary["formulas"]["source"], "S", spec.source)
     target = read_formula(summary["formulas"]["target"], "T", spec.target)
-    _inference(axes, results, source, target)
+    _inference(axes, results, spec, source, target)
     _decision(axes, transferable=transferable)
     _learning(axes, results, spec, source, target, transferable=transferable)
     return figure
@@ -63,18 +63,24 @@ def _collection(axes: Axes, x: float, counts: Mapping[str, Any], spec: StudySpec
         rows["collect"],
         f"Data collection\nQ-learning on τ-states, τ = {tau}\n{episodes} episodes",
     )
-    positives, negatives = counts.get("positives", "–"), counts.get("negatives", "–")
+    positives = counts.get("positives", "–")
+    negatives = thousands(counts.get("candidates" if spec.protocol == "full" else "negatives"))
     note(axes, x, rows["label"], f"Labelled trajectories\n{positives} with label 1, {negatives} with −1")
     arrow(axes, (x, rows["collect"] - 0.47), (x, rows["label"] + 0.36))
     arrow(axes, (x, rows["label"] - 0.36), (x, rows["infer"] + 0.6))
 
 
 def _inference(
-    axes: Axes, results: Mapping[str, Any], source: NamedFormula | None, target: NamedFormula | None
+    axes: Axes,
+    results: Mapping[str, Any],
+    spec: StudySpec,
+    source: NamedFormula | None,
+    target: NamedFormula | None,
 ) -> None:
     y = _ROWS["infer"]
     facts = results["inferences"][0]["source"] if results["inferences"] else {}
-    note(axes, _LEFT, y, f"Inference: decision tree\n{_lines(source, 'S')}\n{_quality(facts)}", linespacing=1.7)
+    way = "Inference: decision tree" if spec.protocol == "paper" else "Inference: primitives together"
+    note(axes, _LEFT, y, f"{way}\n{_lines(source, 'S')}\n{_quality(facts)}", linespacing=1.7)
     attempts = results["inferences"][0]["target"]["attempts"] if results["inferences"] else []
     quality = _quality(attempts[-1]) if attempts else "not attempted"
     note(axes, _RIGHT, y, f"Inference: same operators\n{_lines(target, 'T')}\n{quality}", linespacing=1.7)
