@@ -167,6 +167,13 @@ def test_an_unknown_study_names_those_there_are(tickwise: Tickwise, tmp_path: Pa
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.parametrize("study", ["case1", "pair-01", "random"])
+def test_an_unknown_protocol_names_those_there_are(tickwise: Tickwise, tmp_path: Path, study: str):
+    line = tickwise.fails("reproduce", study, "--protocol", "best", "--out", tmp_path / "run")
+    assert line == "there is no protocol 'best'; choose paper or full"
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_tasks_belong_to_suites(tickwise: Tickwise, tmp_path: Path):
     line = tickwise.fails("reproduce", "case1", "--tasks", 3, "--out", tmp_path / "run")
     assert line == "case1 has no random tasks; leave --tasks out, or reproduce random or all"

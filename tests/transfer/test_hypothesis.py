@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from tests.strategies import VARIABLES, random_trajectories, sdnfs
 from tickwise.automata.run import letters_of
 from tickwise.errors import NotTransferableError
+from tickwise.inference.exact import ExactSettings
 from tickwise.inference.prior import BoxPrior
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
@@ -51,6 +52,30 @@ def task(rng: np.random.Generator, rule: str, n: int = 60, wanted: int = 25, sho
 def outcome(source: Task, target: Task, settings: InferenceSettings, done: Callable[[str], None] | None = None):
     rngs = np.random.default_rng(1), np.random.default_rng(2)
     return transfer_structure(source, target, settings, SWARM, *rngs, done)
+
+
+def test_the_target_may_have_settings_of_its_own():
+    rng = np.random.default_rng(0)
+    tasks = task(rng, "F[1,10] (7 <= x <= 8)"), task(rng, "G[2,6] (1 <= x <= 6)")
+    found = {}
+    for rate in (0.6, 1.0):
+        rngs = np.random.default_rng(1), np.random.default_rng(2)
+        settings, theirs = InferenceSettings(size=1, depth=1), InferenceSettings(size=1, depth=1, rate=rate)
+        found[rate] = transfer_structure(*tasks, settings, SWARM, *rngs, target_settings=theirs)
+    assert found[0.6].transferable
+    assert not found[1.0].transferable
+    assert found[0.6].source == found[1.0].source
+    assert "below the 100.0% that are asked for" in found[1.0].reason
+
+
+def test_labels_that_no_formula_tells_apart_are_not_transferable():
+    walks = np.tile(np.linspace(0.5, 9.5, TICKS + 1)[None, :, None], (40, 1, 1))
+    data = LabelledTrajectories.from_arrays(walks, np.array([1] * 20 + [-1] * 20), ("x",))
+    alike = Task(data, BoxPrior({"x": (0.0, 10.0)}, TICKS), SearchSpace.grid(10, TICKS, ("x",)))
+    rngs = np.random.default_rng(1), np.random.default_rng(2)
+    found = transfer_structure(alike, alike, InferenceSettings(size=2), ExactSettings(joint=True), *rngs)
+    assert (found.tree, found.source_satisfying, found.fit) == (None, False, None)
+    assert not found.transferable
 
 
 def test_similar_tasks_are_identified_as_transferable():
