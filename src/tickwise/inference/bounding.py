@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -30,9 +32,23 @@ class Bounds:
 
     def __call__(self, nodes: list[Node]) -> list[float]:
         """The bound of each node, in units of J."""
+        if self._threads == 1:
+            return bound_all(self._coded, np.array(nodes), *self.arguments).tolist() if nodes else []
         parts = [np.array(nodes[k :: self._threads]) for k in range(self._threads) if nodes[k :: self._threads]]
         found = np.empty(len(nodes))
         run = self._pool.map(lambda part: bound_all(self._coded, part, *self.arguments), parts)
         for k, bounds in enumerate(run):
             found[k :: self._threads] = bounds
         return found.tolist()
+
+
+class Clock:
+    """How long something may take."""
+
+    def __init__(self, seconds: float | None) -> None:
+        self._end = math.inf if seconds is None else time.monotonic() + seconds
+
+    @property
+    def over(self) -> bool:
+        """Whether it has taken that long."""
+        return time.monotonic() > self._end

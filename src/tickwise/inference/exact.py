@@ -15,7 +15,6 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -23,18 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError
-from tickwise.inference.bounding import Bounds
+from tickwise.inference.bounding import Bounds, Clock
 from tickwise.inference.boxes import (
     Node,
     box_of,
-    everywhere,
     first_key,
     outermost,
     ranges,
     root,
     single,
     split,
-    split_between,
     tighter,
 )
 from tickwise.inference.gains import gain_bound
@@ -48,7 +45,9 @@ from tickwise.inference.space import OPERATORS, Gaps, to_formula
 from tickwise.inference.support import lasting
 from tickwise.logic.sdnf import Operator, Primitive
 
-_BATCH = 64  # nodes a compiled call; between two of them Ctrl-C, time and memory are looked at
+BATCH = 64
+"""Nodes a compiled call; between two of them Ctrl-C, time and memory are looked at."""
+
 _FEW = 1000  # trajectories that are weighed sooner than a probability is computed
 _DIVES = 32  # batches that also look at a box of the best node, so that a search that is stopped has something good
 
@@ -210,47 +209,6 @@ def improve(problem: ExactProblem, settings: ExactSettings, least: float) -> Exa
     return _Search(problem, settings, least).run()
 
 
-def beyond_levels(problem: ExactProblem, settings: ExactSettings) -> float:
-    """A bound on J for sides anywhere, at least the levels' resolution apart: the most that more levels could give.
-
-    Between two levels a side is treated as loose for trajectories with label 1 and as tight for the others, so the
-    bound is above what is there. Where all thresholds are levels, it says nothing that `exact_search` does not.
-
-    Args:
-        problem: What is looked for.
-        settings: The limits; a search that is stopped gives a greater bound.
-
-    Returns:
-        No primitive with such sides is worth more than this, in units of J.
-    """
-    prior = problem.prior.arrays(problem.levels.variables)
-    clock, order = _Clock(settings.seconds), itertools.count()
-    heap: list[tuple[float, int, Node]] = []
-    limits = gain_bound(prior, problem.levels, problem.slot, problem.levels.resolution)
-    with Bounds(problem.coded, problem.gaps, problem.worth, limits, settings.threads) as bounds:
-        nodes = [everywhere(problem.levels, *kind) for kind in problem.kinds]
-        while True:
-            for node, bound in zip(nodes, bounds(nodes), strict=True):
-                heapq.heappush(heap, (-bound, next(order), node))
-            if clock.over or len(heap) > settings.nodes or not split_between(heap[0][-1]):
-                return -heap[0][0]
-            nodes = []
-            while heap and len(nodes) < _BATCH and (halves := split_between(heap[0][-1])):
-                heapq.heappop(heap)
-                nodes += halves
-
-
-class _Clock:
-    """How long something may take."""
-
-    def __init__(self, seconds: float | None) -> None:
-        self._end = math.inf if seconds is None else time.monotonic() + seconds
-
-    @property
-    def over(self) -> bool:
-        return time.monotonic() > self._end
-
-
 @dataclass(slots=True)
 class _Best:
     """The best primitive so far; the key says which of equal ones is first."""
@@ -282,7 +240,7 @@ class _Search:
         self.nodes = 0
 
     def run(self) -> ExactResult | None:
-        clock, interrupted, bound = _Clock(self.settings.seconds), False, math.inf
+        clock, interrupted, bound = Clock(self.settings.seconds), False, math.inf
         with self.bounds:
             try:
                 self._push([root(self.problem.levels, *kind) for kind in self.problem.kinds])
@@ -309,7 +267,7 @@ class _Search:
     def _step(self, *, dive: bool) -> None:
         """Take the nodes with the greatest bounds: split ranges, look at single boxes."""
         children: list[Node] = []
-        for _ in range(_BATCH):
+        for _ in range(BATCH):
             self._drop_beaten()
             if not self.heap:
                 break

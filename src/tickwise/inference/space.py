@@ -318,6 +318,8 @@ def _decode_box(
             bounded = True
         if second < space.high[variable]:
             upper[variable] = _rounded(max(second, space.low[variable] + unit), space.decimals[variable])
+            if upper[variable] <= lower[variable]:  # both were rounded to the same number
+                upper[variable] = _rounded(lower[variable] + unit, space.decimals[variable])
             bounded = True
     if not bounded:  # a box needs a side: the whole range of the last variable says nothing either
         lower[-1], upper[-1] = space.low[-1], space.high[-1]
