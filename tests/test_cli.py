@@ -538,7 +538,8 @@ class TestStudies:
         assert lines[3] == "logically transferable: yes"
         assert lines[-1] == f"report: {folder / 'report.html'}"
         assert all(re.search(rf"^│ {method} ", first.out, re.MULTILINE) for method in ("I", "II", "III", "IV"))
-        assert max(map(len, first.out[first.out.index("┏") : first.out.rindex("┘")].splitlines())) <= 80
+        assert re.search(r"^│ paper, learned with .*\n│ full  .* of 2 ", first.out, re.MULTILINE)
+        assert max(len(line) for line in lines if line[:1] in tuple("┏┃┡│└")) <= 80
         monkeypatch.setattr("tickwise.experiments.publish.draw_figures", lambda *_: {})
         again = tickwise("report", folder)
         assert (again.status, again.out, again.err) == (0, first.out, "")

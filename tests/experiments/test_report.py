@@ -84,6 +84,30 @@ def page(html: str) -> Page:
     return Page(html)
 
 
+def test_both_protocols_stand_side_by_side(html: str, results: dict[str, Any]):
+    text = Page(html).text
+    for row in ("paper some random negatives", "full all negatives"):
+        assert row in text
+    assert f"0 of {SPEC.runs} {SPEC.runs} of {SPEC.runs} 0 of {SPEC.runs}" in text  # source, target, both
+    assert "exactly right, 3 of 220 wrong" in re.sub(r" (?=,)", "", text)
+    assert "3 of 16,020 wrong" in text
+    assert "exactly right" in text
+    assert "other regions" in text
+    assert f"true ones in 0 of {SPEC.runs} collections by the paper's inference, and in" in " ".join(
+        verdict(results["summary"], SPEC)
+    )
+    alone = {**results["summary"], "protocols": {"paper": results["summary"]["protocols"]["paper"]}}
+    assert "exact inference" not in " ".join(verdict(alone, SPEC))
+
+
+def test_the_full_protocol_is_among_the_choices():
+    found = next(choice for choice in choices(SPEC) if "full protocol" in choice.subject)
+    assert "s = (P + 200) / (P + N)" in found.ours
+    assert "do not learn" in found.ours
+    learned = next(choice for choice in choices(replace(SPEC, protocol="full")) if "full protocol" in choice.subject)
+    assert learned.ours.endswith("The methods learn with its formulas.")
+
+
 def test_the_page_is_well_formed_and_needs_nothing_else(page: Page):
     assert max(page.ids.values()) == 1
     assert all(link.startswith("#") and link[1:] in page.ids for link in page.links)

@@ -54,11 +54,12 @@ def inference_rows(
 def _formula(found: Mapping[str, Any], task: str, spec: StudySpec) -> dict[str, Any]:
     formula = read_formula(found["formula"], _KEYS[task], environment_of(spec, task))
     names = {} if formula is None else formula.names
-    errors = "" if found["errors"] is None else f"{found['errors']:,} of {found['of']:,} wrong"
+    errors = "" if found["errors"] is None else f", {found['errors']:,} of {found['of']:,} wrong"
+    verdict = "exactly right" if found["exact"] else "other operators" if found["exact_regions"] else "other regions"
     return {
         "named": None if formula is None else formula.plain,
         "regions": "; ".join(f"{name.plain} = {ranges_text(box)}" for box, name in names.items()),
         "exact": found["exact"],
-        "lacking": "other operators" if found["exact_regions"] else "other regions",
+        "verdict": verdict,
         "errors": errors,
     }

@@ -80,6 +80,7 @@ def _task(
 ) -> dict[str, Any]:
     """A formula, and how many of how many trajectories it classifies wrongly."""
     text = inference[task]["formula"]
+    rate = None if text is None else rate  # that of an attempt which failed is no formula's
     of = counts["positives"] + counts["candidates" if protocol == "full" else "negatives"]
     weighted = protocol == "paper" and spec.inference.class_weight is not None
     return {

@@ -16,7 +16,7 @@ METHODS = ("I", "II", "III", "IV")
 """The methods of Section V: τ-states; the formula without information gain; the formula; with transferred values."""
 
 PROTOCOLS = {
-    "paper": "200 random negatives, a particle swarm, primitives one by one",
+    "paper": "some random negatives, a particle swarm, primitives one by one",
     "full": "all negatives, an exact search, primitives together",
 }
 """How formulas are inferred, as the paper does it and with all there is, and what each is in a few words."""
