@@ -413,7 +413,9 @@ def test_infer_finds_what_tells_the_labels_apart(tickwise: Tickwise, logs: Path)
     answer = tickwise("infer", logs, "--depth", "1", "--json")
     assert (answer.status, answer.err) == (0, "")
     facts = answer.document
-    assert list(facts) == ["formula", "classification_rate", "information_gain", "size", "satisfying", "seconds"]
+    told = ["formula", "classification_rate", "information_gain", "size", "satisfying", "seconds"]
+    assert list(facts) == [*told, "search", "gap", "interrupted"]
+    assert (facts["search"], facts["gap"], facts["interrupted"]) == ("exact", 0, False)
     assert facts["classification_rate"] == 1.0
     assert facts["satisfying"] is True
     assert 1 <= facts["size"] <= 4
@@ -429,12 +431,25 @@ def test_infer_finds_what_tells_the_labels_apart(tickwise: Tickwise, logs: Path)
 def test_infer_for_people(tickwise: Tickwise, logs: Path):
     answer = tickwise("infer", logs, "--depth", "1", "--class-weight", "balanced")
     assert answer.status == 0
-    formula, words, facts = answer.out.splitlines()
+    formula, words, facts, proof = answer.out.splitlines()
+    assert proof == "each node's best, proved"
     assert tickwise("compare", formula, formula).status == 0
     assert words.startswith("in words: ")
     assert re.fullmatch(
         r"classification rate 1\.0000, information gain \d\.\d{4}, size \d, satisfying \(Problem 1\), [\d.]+ s", facts
     )
+
+
+@pytest.mark.parametrize("search", ["joint", "swarm"])
+def test_infer_by_another_search(tickwise: Tickwise, logs: Path, search: str):
+    facts = tickwise("infer", logs, "--search", search, "--json").document
+    assert (facts["search"], facts["gap"], facts["classification_rate"]) == (search, None, 1.0)
+
+
+def test_infer_says_which_searches_there_are(tickwise: Tickwise, logs: Path):
+    answer = tickwise("infer", logs, "--search", "luck")
+    assert answer.status == 1
+    assert answer.err.splitlines() == ["error: search is 'luck'; use 'exact', 'joint', 'swarm'"]
 
 
 def test_infer_may_find_nothing(tickwise: Tickwise, tmp_path: Path):

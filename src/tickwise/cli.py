@@ -264,7 +264,8 @@ def infer(
             f"{'' if facts['satisfying'] else 'not '}satisfying (Problem 1), {spent:.1f} s"
         )
         if model.gap_ is not None:
-            output.print("proved to be the best" if model.gap_ == 0 else f"J can be better by {model.gap_:.2g} at most")
+            proved = model.gap_ <= 1e-12
+            output.print("each node's best, proved" if proved else f"a node's J can be {model.gap_:.2g} better at most")
     if model.interrupted_:
         messages.print("interrupted: this is the best so far")
         raise typer.Exit(INTERRUPTED)

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from tests.inference.exhaustive import Choice, best_of_all, every_time, problem_of, worth
 from tests.inference.worlds import grid_prior
 from tickwise.errors import ConfigurationError, UnknownVariableError
+from tickwise.inference.beyond import beyond_levels
 from tickwise.inference.bounding import Bounds
 from tickwise.inference.boxes import Node
-from tickwise.inference.exact import ExactProblem, ExactSettings, beyond_levels, exact_search
+from tickwise.inference.exact import ExactProblem, ExactSettings, exact_search
 from tickwise.inference.objective import trajectory_weights
 from tickwise.inference.prior import BoxPrior, MarkovPrior, PathPrior, Prior
 from tickwise.inference.space import OPERATORS, Gaps, SearchSpace
