@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
+from tickwise.inference.bounding import TIE
 from tickwise.inference.draft import Draft, Drafter, Structure, filled
-from tickwise.inference.exact import TIE
 from tickwise.logic.syntax import Interval
 
 COARSE = 10

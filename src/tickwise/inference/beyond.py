@@ -5,9 +5,9 @@ from __future__ import annotations
 import heapq
 import itertools
 
-from tickwise.inference.bounding import Bounds, Clock
+from tickwise.inference.bounding import BATCH, Bounds, Clock
 from tickwise.inference.boxes import Node, everywhere, split_between
-from tickwise.inference.exact import BATCH, ExactProblem, ExactSettings
+from tickwise.inference.exact import ExactProblem, ExactSettings
 from tickwise.inference.gains import gain_bound
 
 

@@ -42,6 +42,31 @@ class Bounds:
         return found.tolist()
 
 
+BATCH = 64
+"""Nodes a compiled call; between two of them Ctrl-C, time and memory are looked at."""
+
+TIE = 1e-12
+"""Values of J nearer than this are equal."""
+
+
+class Bounded:
+    """What a search found, with a bound on what there is; the attributes are those of the class that takes this up."""
+
+    __slots__ = ()
+    value: float
+    bound: float
+
+    @property
+    def gap(self) -> float:
+        """How much better than what was found the best there is can be at most, in units of J."""
+        return max(self.bound - self.value, 0.0)
+
+    @property
+    def proved(self) -> bool:
+        """Whether what was found is proved to be the best."""
+        return self.gap <= TIE
+
+
 class Clock:
     """How long something may take."""
 

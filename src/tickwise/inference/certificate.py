@@ -11,23 +11,20 @@ from __future__ import annotations
 import heapq
 import itertools
 import math
-import time
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise.inference.bounding import BATCH, TIE, Bounded, Clock
 from tickwise.inference.draft import Draft, Drafter, Structure, draft_of
-from tickwise.inference.exact import TIE
 from tickwise.inference.gains import gain_bound
 from tickwise.inference.rectangles import LEAST, Formulas, Rectangle, bound, everything, expand, is_single, tighten
 from tickwise.inference.space import shape_of, to_formula
 
-_BATCH = 64  # rectangles a compiled call; between two of them Ctrl-C, time and memory are looked at
-
 
 @dataclass(frozen=True, slots=True)
-class Certificate:
+class Certificate(Bounded):
     """What is known of the best formula of a structure.
 
     Attributes:
@@ -43,16 +40,6 @@ class Certificate:
     bound: float
     rectangles: int
     interrupted: bool = False
-
-    @property
-    def gap(self) -> float:
-        """How much better the best formula can be at most, in units of J."""
-        return max(self.bound - self.value, 0.0)
-
-    @property
-    def proved(self) -> bool:
-        """Whether the formula is proved to be the best."""
-        return self.gap <= TIE
 
 
 def certify(drafter: Drafter, structure: Structure, draft: Draft, seconds: float | None = None) -> Certificate:
@@ -88,12 +75,11 @@ class _Search:
             self._take(whole[None], np.array([bound(self.formulas, whole, self._enough)]))
 
     def run(self, seconds: float | None) -> Certificate:
-        end = math.inf if seconds is None else time.monotonic() + seconds
-        most, interrupted = math.inf, False
+        clock, most, interrupted = Clock(seconds), math.inf, False
         try:
             while self.heap:
                 most = -self.heap[0][0]  # of all that is left, also while some of it is taken off the heap
-                if time.monotonic() > end or len(self.heap) > self.drafter.settings.nodes:
+                if clock.over or len(self.heap) > self.drafter.settings.nodes:
                     break
                 self._take(*expand(self.formulas, np.array(self._next()), self._enough))
             else:
@@ -109,7 +95,7 @@ class _Search:
 
     def _next(self) -> list[Rectangle]:
         """The rectangles with the greatest bounds."""
-        return [heapq.heappop(self.heap)[-1] for _ in range(min(_BATCH, len(self.heap)))]
+        return [heapq.heappop(self.heap)[-1] for _ in range(min(BATCH, len(self.heap)))]
 
     def _take(self, rectangles: Rectangle, bounds: NDArray[np.float64]) -> None:
         """Keep the rectangles that may hold something better; where one of them is a single formula, it is."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 
 _MOST_DIGITS = 17  # of a float64, all of which round trip
 
@@ -35,3 +36,9 @@ def shortest_between(low: float, high: float) -> float:
         if low < nearest < high:
             return nearest + 0.0
     return middle if low < middle < high else high
+
+
+def decimals(number: float) -> int:
+    """How many decimals a finite number is printed with."""
+    exponent = Decimal(repr(float(number))).normalize().as_tuple().exponent
+    return max(-int(exponent), 0)

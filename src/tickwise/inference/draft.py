@@ -11,8 +11,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise.inference.bounding import TIE
 from tickwise.inference.counting import log_probability
-from tickwise.inference.exact import TIE, ExactProblem, ExactResult, ExactSettings, improve
+from tickwise.inference.exact import ExactProblem, ExactResult, ExactSettings, improve
 from tickwise.inference.kernels import Shape
 from tickwise.inference.levels import Coded, Levels, code
 from tickwise.inference.objective import formula_signature

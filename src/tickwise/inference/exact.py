@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError
-from tickwise.inference.bounding import Bounds, Clock
+from tickwise.inference.bounding import BATCH, TIE, Bounded, Bounds, Clock
 from tickwise.inference.boxes import (
     Node,
     box_of,
@@ -45,14 +45,8 @@ from tickwise.inference.space import OPERATORS, Gaps, to_formula
 from tickwise.inference.support import lasting
 from tickwise.logic.sdnf import Operator, Primitive
 
-BATCH = 64
-"""Nodes a compiled call; between two of them Ctrl-C, time and memory are looked at."""
-
 _FEW = 1000  # trajectories that are weighed sooner than a probability is computed
 _DIVES = 32  # batches that also look at a box of the best node, so that a search that is stopped has something good
-
-TIE = 1e-12
-"""Values of J nearer than this are equal."""
 
 KINDS = tuple(itertools.product((True, False), (False, True)))
 """Whether the operator is ◇ or ◇□, and whether the box is complemented."""
@@ -94,7 +88,7 @@ class ExactSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class ExactResult:
+class ExactResult(Bounded):
     """What an exact search found.
 
     Attributes:
@@ -116,16 +110,6 @@ class ExactResult:
     bound: float
     nodes: int
     interrupted: bool = False
-
-    @property
-    def gap(self) -> float:
-        """How much better the best primitive of the space can be at most, in units of J."""
-        return max(self.bound - self.value, 0.0)
-
-    @property
-    def proved(self) -> bool:
-        """Whether the primitive is proved to be the best of the space."""
-        return self.gap <= TIE
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tickwise.inference.exact import TIE
+from tickwise.inference.bounding import TIE
 from tickwise.inference.tree import InferenceSettings
 from tickwise.logic.sdnf import SDNF
 
@@ -49,9 +49,16 @@ class Fit:
 
     @classmethod
     def of(
-        cls, formula: SDNF, rate: float, gain: float, settings: InferenceSettings, bound: float | None = None
+        cls,
+        formula: SDNF,
+        rate: float,
+        gain: float,
+        settings: InferenceSettings,
+        bound: float | None = None,
+        *,
+        interrupted: bool = False,
     ) -> Fit:
         """The fit of a formula whose classification rate and information gain are known."""
         objective = rate + settings.information_weight * gain
         satisfying = rate >= settings.rate and formula.size <= settings.size
-        return cls(formula, objective, rate, gain, satisfying, bound)
+        return cls(formula, objective, rate, gain, satisfying, bound, interrupted)

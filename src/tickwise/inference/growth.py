@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import replace
 
 from tickwise.errors import DataError
 from tickwise.inference.beginnings import COARSE, Bar, climb, completed, emphasis, retimed
+from tickwise.inference.bounding import TIE
 from tickwise.inference.draft import FREE, Draft, Drafter, Structure, coarser, formula_of
-from tickwise.inference.exact import TIE, ExactSettings
+from tickwise.inference.exact import ExactSettings
 from tickwise.inference.fit import Fit
 from tickwise.inference.objective import trajectory_weights
 from tickwise.inference.prior import Prior
@@ -59,8 +59,7 @@ def infer_jointly(
         raise DataError(
             "no formula tells the labels apart better than a trivial one; use other variables or a finer space"
         )
-    fit = Fit.of(formula_of(found[-1]), *drafter.parts(found[-1]), settings)
-    return replace(fit, interrupted=drafter.interrupted)
+    return Fit.of(formula_of(found[-1]), *drafter.parts(found[-1]), settings, interrupted=drafter.interrupted)
 
 
 def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:
@@ -97,9 +96,10 @@ def grow_jointly(drafter: Drafter, size: int, rate: float) -> list[Draft]:
             best, size = best[:enough], enough - 1  # from here on only smaller ones are looked for
             if size < 2:
                 return best
-    values = [drafter.value(draft) for draft in best]
-    known = best and drafter.rate(best[-1]) >= rate
-    return best if known else best[: 1 + next((k for k, v in enumerate(values) if v >= max(values) - TIE), 0)]
+    if best and drafter.rate(best[-1]) < rate:
+        values = [drafter.value(draft) for draft in best]
+        best = best[: 1 + next(k for k, value in enumerate(values) if value >= max(values) - TIE)]
+    return best
 
 
 def _better(drafter: Drafter, rate: float, drafts: Iterable[Draft | None]) -> Draft:

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.inference.decimals import shortest_between
+from tickwise.inference.decimals import decimals, shortest_between
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.sdnf import SDNF, Primitive, SequentialConjunction
-from tickwise.logic.syntax import Box, Not
+from tickwise.logic.syntax import Bound, Box, Not
 
 _OTHER = {"lower": "upper", "upper": "lower"}
 
@@ -59,8 +59,9 @@ def _readable(primitive: Primitive, data: LabelledTrajectories, ranges: Mapping[
             other = _side(primitive, bound.variable, _OTHER[side])
             first, last = ranges[bound.variable]
             low, high = (max(low, other), min(high, last)) if outward > 0 else (max(low, first), min(high, other))
-            if low < high:
-                primitive = _with_side(primitive, bound.variable, side, shortest_between(low, high))
+            shortest = shortest_between(low, high) if low < high else number
+            if decimals(shortest) <= decimals(number):  # a value of the data itself may be shorter
+                primitive = _with_side(primitive, bound.variable, side, shortest)
     return primitive
 
 
@@ -111,13 +112,17 @@ def _verdicts(primitive: Primitive, data: LabelledTrajectories) -> NDArray[np.in
     return np.asarray(found)
 
 
+def _bound(primitive: Primitive, variable: str) -> Bound:
+    return next(bound for bound in primitive.box.bounds if bound.variable == variable)
+
+
 def _strict(primitive: Primitive, variable: str, side: str) -> bool:
-    bound = next(bound for bound in primitive.box.bounds if bound.variable == variable)
+    bound = _bound(primitive, variable)
     return bound.lower_strict if side == "lower" else bound.upper_strict
 
 
 def _side(primitive: Primitive, variable: str, side: str) -> float:
-    bound = next(bound for bound in primitive.box.bounds if bound.variable == variable)
+    bound = _bound(primitive, variable)
     return bound.lower if side == "lower" else bound.upper
 
 

@@ -195,6 +195,19 @@ def _gains(node: NDArray[np.int64], prior: GainBound, worth: Worth, ticks: int) 
 
 
 @njit
+def _durations(worth: Worth, ticks: int) -> range:
+    """The durations that are allowed in a gap of so many ticks; 0 stands for ◇ and □."""
+    return range(0 if worth.plain else 1, ticks - 1 if worth.nested else 1)
+
+
+@njit
+def _value(view: NDArray[np.float64], gains: NDArray[np.float64], worth: Worth, duration: int, a: int, b: int) -> float:
+    """What the primitive of an entry of the table is worth at most."""
+    value = float((worth.base + view[duration, a, b]) / worth.total + gains[b - a, duration])
+    return value - worth.nesting_cost if duration else value
+
+
+@njit
 def bound(
     coded: Coded,
     node: NDArray[np.int64],
@@ -223,12 +236,10 @@ def bound(
         first, last = gaps[gap, 0], gaps[gap, 1]
         view = tabulate(coded, node, first, last, table)
         gains = _gains(node, prior, worth, len(view))
-        for duration in range(0 if worth.plain else 1, len(view) - 1 if worth.nested else 1):
+        for duration in _durations(worth, len(view)):
             for a in range(len(view) - duration):
                 for b in range(a + 1, len(view) - duration):
-                    value = (worth.base + view[duration, a, b]) / worth.total
-                    value += gains[b - a, duration]
-                    value -= worth.nesting_cost if duration else 0.0
+                    value = _value(view, gains, worth, duration, a, b)
                     if value > most:
                         most = value
                         times[0], times[1], times[2] = first + a, first + b, duration
@@ -287,12 +298,10 @@ def candidates(
         first, last = gaps[gap, 0], gaps[gap, 1]
         view = tabulate(coded, node, first, last, table)
         gains = _gains(node, prior, worth, len(view))
-        for duration in range(0 if worth.plain else 1, len(view) - 1 if worth.nested else 1):
+        for duration in _durations(worth, len(view)):
             for a in range(len(view) - duration):
                 for b in range(a + 1, len(view) - duration):
-                    value = (worth.base + view[duration, a, b]) / worth.total
-                    value += gains[b - a, duration]
-                    value -= worth.nesting_cost if duration else 0.0
+                    value = _value(view, gains, worth, duration, a, b)
                     if value < enough or _dominated(view, a, b, duration, node[EXISTENTIAL] == 1, floor):
                         continue
                     times.append((first + a, first + b, duration))
