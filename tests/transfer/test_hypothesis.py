@@ -7,13 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.inference.test_exact import Interrupter
 from tests.strategies import VARIABLES, random_trajectories, sdnfs
 from tickwise.automata.run import letters_of
 from tickwise.errors import NotTransferableError
+from tickwise.inference.bounding import Bounds
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.prior import BoxPrior
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
+from tickwise.inference.template import fit_transferable
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.inference.tree import DecisionTree, InferenceSettings, classification_rate, is_satisfying
 from tickwise.logic.parse import parse
@@ -169,3 +172,30 @@ def test_tick_tables_say_what_the_semantics_says_also_where_a_formula_looks_beyo
     for table, disjunct in zip(tables, formula.disjuncts, strict=True):
         expected = disjunct.formula.verdict(X, variables=VARIABLES)
         np.testing.assert_array_equal(table.verdicts(letters_of(table.automaton, X, variables=VARIABLES)), expected)
+
+
+@pytest.mark.parametrize("joint", [False, True])
+@pytest.mark.parametrize("call", [1, 2, 4, 8, 12])
+def test_ctrl_c_leaves_no_hypothesis_on_half_a_search(monkeypatch, joint, call):
+    rng = np.random.default_rng(0)
+    tasks = task(rng, "F[1,10] (7 <= x <= 8)"), task(rng, "F[2,9] (1 <= x <= 3)")
+    interrupter = Interrupter(call)
+    monkeypatch.setattr(Bounds, "__call__", lambda bounds, nodes: interrupter(bounds, nodes))
+    rngs = np.random.default_rng(1), np.random.default_rng(2)
+    with pytest.raises(KeyboardInterrupt):
+        transfer_structure(*tasks, InferenceSettings(), ExactSettings(joint=joint), *rngs)
+    assert interrupter.left <= 0
+
+
+@pytest.mark.parametrize("call", [1, 3, 5, 20])
+def test_ctrl_c_leaves_no_fit_to_transfer(monkeypatch, call):
+    target = task(np.random.default_rng(0), "G[0,3] (x <= 6) & F[5,9] (7 <= x <= 8)")
+    source = to_sdnf(parse("G[0,2] (x <= 5) & F[4,9] (6 <= x <= 8)"))
+    interrupter = Interrupter(call)
+    monkeypatch.setattr(Bounds, "__call__", lambda bounds, nodes: interrupter(bounds, nodes))
+    with pytest.raises(KeyboardInterrupt):
+        fit_transferable(
+            target.data, target.prior, target.space, source, InferenceSettings(), ExactSettings(),
+            np.random.default_rng(0),
+        )  # fmt: skip
+    assert interrupter.left <= 0

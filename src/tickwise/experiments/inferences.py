@@ -89,12 +89,10 @@ def infer(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outcom
     rngs = [generator(spec.seed, spec.name, "infer", what, job.run) for what in ("source", "target", "plain")]
     report(0, len(STEPS))
     _compile_inference(protocol)
-    # the exact search works in threads of its own; a cluster's worker may have other jobs in others
-    clock = time.thread_time if protocol == "paper" else time.process_time
-    marks = [clock()]
+    marks = [time.thread_time()]  # a cluster's worker may have other jobs in other threads
 
     def done(step: str) -> None:
-        marks.append(clock())
+        marks.append(time.thread_time())
         report(STEPS.index(step) + 1, len(STEPS))
 
     found = transfer_structure(source, target, ours, search, rngs[0], rngs[1], done, target_settings=theirs)

@@ -156,7 +156,7 @@ class MITLClassifier:
             self.tree_ = infer_tree(data, prior, space, settings, limits if self.search == "exact" else swarm, rng)
             gaps = [node.gap for node in self.tree_.nodes() if node.gap is not None]
             self.gap_ = max(gaps, default=None)
-            self.interrupted_ = any(node.stop == "interrupted" for node in self.tree_.nodes())
+            self.interrupted_ = self.tree_.interrupted
             found = self.tree_.formula
         self.formula_: SDNF | None = None if found is None else readable(found, data, space)
         self.satisfying_: bool = is_satisfying(self.formula_, data, settings)

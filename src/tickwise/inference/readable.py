@@ -59,7 +59,9 @@ def _readable(primitive: Primitive, data: LabelledTrajectories, ranges: Mapping[
             other = _side(primitive, bound.variable, _OTHER[side])
             first, last = ranges[bound.variable]
             low, high = (max(low, other), min(high, last)) if outward > 0 else (max(low, first), min(high, other))
-            shortest = shortest_between(low, high) if low < high else number
+            if low >= high:
+                continue
+            shortest = shortest_between(low, high)
             if decimals(shortest) <= decimals(number):  # a value of the data itself may be shorter
                 primitive = _with_side(primitive, bound.variable, side, shortest)
     return primitive

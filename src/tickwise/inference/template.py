@@ -102,7 +102,7 @@ def fit_structure(
     if isinstance(search, ExactSettings):
         drafter = Drafter(data, weights, prior, space, settings.information_weight, 0.0, search)
         found, bound = _exactly(drafter, structure_of(pairs), None if start is None else draft_of(start))
-        return Fit.of(formula_of(found), *drafter.parts(found), settings, bound)
+        return Fit.of(formula_of(found), *drafter.parts(found), settings, bound, interrupted=drafter.interrupted)
     return _fit_by_swarm(data, prior, space, pairs, settings, search, rng, start)
 
 
@@ -185,6 +185,7 @@ def fit_transferable(
     Raises:
         DataError: If a label is missing.
         ConfigurationError: If the structure does not fit into the space's horizon.
+        KeyboardInterrupt: If Ctrl-C ended an exact search.
     """
     attempts: list[Fit] = []
     copies = 1
@@ -192,11 +193,13 @@ def fit_transferable(
         previous = attempts[-1].formula if attempts else None
         structure = SDNF(source.disjuncts * copies)
         attempts.append(fit_structure(data, prior, space, structure, settings, search, rng, start=previous))
+        if attempts[-1].interrupted:
+            raise KeyboardInterrupt  # whether there is a satisfying formula is not known
         if attempts[-1].satisfying:
             noun = "formula" if copies == 1 else f"disjunction of {copies} formulas"
             reason = (
-                f"A {noun} structurally equivalent with the source's classifies {attempts[-1].rate:.1%} of the "
-                f"target's trajectories rightly, at least the {settings.rate:.1%} that are asked for."
+                f"A {noun} structurally equivalent with the source's classifies {_percent(attempts[-1].rate)} of the "
+                f"target's trajectories rightly, at least the {_percent(settings.rate)} that are asked for."
             )
             return TransferFit(tuple(attempts), True, reason)
         copies += 1
@@ -207,10 +210,15 @@ def fit_transferable(
         reason = (
             f"Logical transferability is not identified: with up to {len(attempts)} "
             f"cop{'y' if len(attempts) == 1 else 'ies'} of the source's structure the best classification rate on the "
-            f"target is {best:.1%}, below the {settings.rate:.1%} that are asked for, and one more copy would exceed "
-            f"size {settings.size}."
+            f"target is {_percent(best)}, below the {_percent(settings.rate)} that are asked for, and one more copy "
+            f"would exceed size {settings.size}."
         )
     return TransferFit(tuple(attempts), False, reason)
+
+
+def _percent(rate: float) -> str:
+    """A rate in percent, with so many decimals that only all is 100 %."""
+    return next(text for places in range(1, 16) if (text := f"{rate:.{places}%}") != f"{1:.{places}%}" or rate == 1)
 
 
 def _pairs(structure: Structure | SDNF) -> list[list[tuple[Operator, bool]]]:

@@ -96,6 +96,7 @@ class DecisionTree:
         right: The node of those that violate it.
         gap: How much better the best primitive of Υ_z can be at most, in units of J: 0 where it is proved to be the
             best; None where the search was not exact.
+        interrupted: Whether Ctrl-C ended the search here, before or below: then the tree is only the best so far.
     """
 
     path: tuple[Primitive, ...]
@@ -111,6 +112,7 @@ class DecisionTree:
     left: DecisionTree | None = field(default=None)
     right: DecisionTree | None = field(default=None)
     gap: float | None = None
+    interrupted: bool = False
 
     @property
     def leaf(self) -> bool:
@@ -234,21 +236,20 @@ class _Grower:
         if data is None or stop is not None:  # line 2
             # lines 3 to 7: a leaf, with label 1 if more than half of its trajectories have it
             label = 1 if share > 0.5 else -1
-            return DecisionTree(path, depth, positives, negatives, stop, label)
+            return DecisionTree(path, depth, positives, negatives, stop, label, interrupted=interrupted)
         # lines 9 to 11: a non-leaf node with the best primitive over Υ_z, which the gaps are
         best = self._best(data, weights, gaps, rng)
         # line 12: partition
         primitive = best.primitive
         satisfied = formula_signature(SDNF((SequentialConjunction((primitive,)),)), data)
-        children = []
+        interrupted, children = best.interrupted, list[DecisionTree]()
         for mask, step in ((satisfied, primitive), (~satisfied, primitive.negation)):  # lines 13 and 14
             subset, below = data.select(mask) if mask.any() else None, (*path, step)
-            children.append(
-                self.grow(subset, weights[mask], below, depth + 1, rng.spawn(1)[0], interrupted=best.interrupted)
-            )
+            children.append(self.grow(subset, weights[mask], below, depth + 1, rng.spawn(1)[0], interrupted))
+            interrupted = interrupted or children[-1].interrupted
         return DecisionTree(
             path, depth, positives, negatives, None, None, primitive, best.objective, best.rate, best.gain,
-            left=children[0], right=children[1], gap=best.gap,
+            left=children[0], right=children[1], gap=best.gap, interrupted=interrupted,
         )  # fmt: skip
 
     def _stop(self, share: float, depth: int, gaps: Gaps) -> str | None:

@@ -102,10 +102,14 @@ def transfer_structure(
 
     Returns:
         What was inferred, and whether logical transferability is identified.
+
+    Raises:
+        KeyboardInterrupt: If Ctrl-C ended an exact search, whose best so far is nothing to build on.
     """
     given = (source.data, source.prior, source.space, settings)
     jointly = search if isinstance(search, ExactSettings) and search.joint else None
     tree = infer_tree(*given, search, source_rng) if jointly is None else None
+    _require_whole(tree is not None and tree.interrupted)
     if done is not None:
         done("tree")
     formula = source_formula(tree, source, settings, search, source_rng) if tree else None
@@ -127,9 +131,17 @@ def _joint_formula(source: Task, settings: InferenceSettings, limits: ExactSetti
     """The formula that is found with all primitives together; None where there is no good one."""
     source.data.require_both_classes()
     try:
-        return infer_jointly(source.data, source.prior, source.space, settings, limits).formula
+        fit = infer_jointly(source.data, source.prior, source.space, settings, limits)
     except DataError:  # both labels are there: no formula is better than a trivial one
         return None
+    _require_whole(fit.interrupted)
+    return fit.formula
+
+
+def _require_whole(interrupted: bool) -> None:
+    """Nothing is built on a formula that is only the best so far."""
+    if interrupted:
+        raise KeyboardInterrupt
 
 
 def source_formula(
@@ -159,6 +171,7 @@ def source_formula(
     for start in dict.fromkeys((SDNF((main,)), formula)):
         if start.size <= settings.size:
             fit = fit_structure(source.data, source.prior, source.space, start, settings, search, rng, start=start)
+            _require_whole(fit.interrupted)
             if fit.satisfying:
                 return fit.formula
     return formula
