@@ -4,7 +4,10 @@ The formula is that of Case Study 1's source; where trajectories grow longer, it
 is written by hand for this formula; it stops reading a trajectory when it knows the answer. Each library is given the
 trajectories in the form that it wants, which is not timed, and answers for one after the other, since none takes a
 batch. Their answers have to be ours. metric-temporal-logic and mstlo give verdicts, the former for every tick; rtamt
-and stlpy give the robustness alone.
+and stlpy give the robustness alone, which is positive where the verdict is true.
+
+At the size of the case study there are the kernels alone as well: from arrays, with the search for NaN and the
+comparisons with the boxes, and coded, where these comparisons were made before, a bit each.
 """
 
 from __future__ import annotations
@@ -23,11 +26,15 @@ from numpy.typing import NDArray
 from benchmarks.contest import Contender, Turn, contest
 from benchmarks.native import library, pointer
 from benchmarks.result import OURS, Result
+from tickwise.logic import bits
 from tickwise.logic.parse import parse
+from tickwise.logic.program import program
 
 COUNTS = (100, 1_000, 10_000, 100_000, 1_000_000)
 TICKS = (40, 120, 400, 1_200, 4_000)
 MOST_FOR_PEERS = 100
+CASE_STUDY = 246
+"""Trajectories of 41 ticks."""
 G, Y = ((3, 4), (3, 5)), ((7, 8), (5, 8))
 """The regions, a range of x and one of y."""
 
@@ -86,6 +93,36 @@ def verdicts(windows: Windows, states: NDArray[np.float64]) -> Turn:
 def robustness(windows: Windows, states: NDArray[np.float64]) -> Turn:
     phi = parse(str(windows))
     return lambda: phi.robustness(states, variables=("x", "y"))
+
+
+def kernel(windows: Windows, states: NDArray[np.float64]) -> Turn:
+    """The kernel from arrays, without the public call around it."""
+    compiled = program(parse(str(windows)), states.shape[1])
+    rows, lengths = states.reshape(len(states), -1), np.full(len(states), states.shape[1])
+    answers = np.empty(len(states), dtype=np.int8)
+
+    def turn() -> NDArray[np.bool_]:
+        bits.verdicts(rows, lengths, answers, *compiled.for_verdicts)
+        return answers == 1
+
+    return turn
+
+
+def coded_kernel(windows: Windows, states: NDArray[np.float64]) -> Turn:
+    """The kernel on trajectories that were compared with the boxes before."""
+    compiled = program(parse(str(windows)), states.shape[1])
+    count, rows = len(states), states.reshape(len(states), -1)
+    codes = np.empty((len(compiled.boxes), bits.words_of(compiled.lower.shape[1]), count), dtype=np.uint64)
+    signals = np.empty((compiled.depth, len(compiled.pattern), count), dtype=np.uint64)
+    bits.encode(rows, 0, count, compiled.stride, compiled.spans, compiled.lower, compiled.upper, codes)
+    ends = np.full(count, rows.shape[1])
+    arguments = compiled.code, compiled.stride, compiled.pattern, compiled.spans, codes, ends
+
+    def turn() -> NDArray[np.bool_]:
+        bits.evaluate(*arguments, bits.NONE, True, signals, count)
+        return signals[0, 0] & np.uint64(1) == 1
+
+    return turn
 
 
 def in_c(windows: Windows, states: NDArray[np.float64]) -> Turn:
@@ -207,8 +244,24 @@ def compare(count: int, ticks: int, axis: str, unit: str) -> list[Result]:
     return results + contest("robustness", unit, those, axis=axis, size=size, agree=np.allclose)
 
 
+def case_study() -> list[Result]:
+    """One formula on the trajectories of the case study."""
+    windows, states = Windows.fitting(41), walks(CASE_STUDY, 41)
+    turns = {OURS: verdicts, "kernel, arrays": kernel, "kernel, coded": coded_kernel, "C": in_c}
+    those = [
+        Contender(name, functools.partial(turn, windows, states), 1, 5, rounds=2_000) for name, turn in turns.items()
+    ]
+
+    def positive(windows: Windows, states: NDArray[np.float64]) -> tuple[Check, Iterable[Any]]:
+        check, trajectories = rtamt(windows, states)
+        return lambda one: check(one) > 0, trajectories
+
+    those.append(Contender("rtamt", functools.partial(one_by_one, positive, windows, states), 1, 3))
+    return contest("one formula", f"{CASE_STUDY} trajectories", those, agree=np.array_equal)
+
+
 def measure(quick: bool) -> list[Result]:
-    results = []
+    results = case_study()
     for count in (10, 200) if quick else COUNTS:
         results += compare(count, 41, "trajectories", "batch")
     count = 10 if quick else MOST_FOR_PEERS
