@@ -35,8 +35,8 @@ CONFINED = {
     "gymnasium": ("envs/",),
     "matplotlib": ("experiments/figures/",),
     "distributed": ("experiments/cluster.py", "experiments/remote.py"),
-    "typer": ("cli.py",),
-    "rich": ("cli.py", "experiments/progress.py", "experiments/tables.py"),
+    "typer": ("cli/",),
+    "rich": ("cli/", "experiments/progress.py", "experiments/tables.py"),
 }
 UNSAFE = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "shelve", "marshal"}
 
@@ -126,11 +126,11 @@ def test_module_keeps_the_rules(path: str):
         ("logic/render.py", "import lark.lexer", "lark is imported only in logic/parse.py"),
         ("rl/states.py", "import gymnasium as gym", "gymnasium is imported only in envs/"),
         ("experiments/report.py", "import matplotlib.pyplot as plt", "matplotlib is imported only in"),
-        ("experiments/progress.py", "import typer", "typer is imported only in cli.py"),
+        ("experiments/progress.py", "import typer", "typer is imported only in cli/"),
         (
             "experiments/store.py",
             "import rich",
-            "rich is imported only in cli.py and experiments/progress.py and experiments/tables.py",
+            "rich is imported only in cli/ and experiments/progress.py and experiments/tables.py",
         ),
         ("experiments/store.py", "import pickle", "pickle runs code"),
         ("experiments/store.py", "np.load(path, allow_pickle=True)", "allow_pickle is not False"),
@@ -153,7 +153,7 @@ def test_a_broken_rule_is_found(path: str, source: str, message: str):
         ("automata/build.py", "from tickwise.logic.sdnf import SDNF\nfrom . import model"),
         ("envs/environment.py", "import gymnasium"),
         ("transfer/hypothesis.py", "from tickwise.inference import tree\nfrom tickwise.rl import qtable"),
-        ("cli.py", "import typer, rich\nfrom tickwise.experiments import runner"),
+        ("cli/app.py", "import typer, rich\nfrom tickwise.experiments import runner"),
         ("__init__.py", "from tickwise.envs.registration import register_with_gymnasium"),
         ("experiments/store.py", "np.load(path, allow_pickle=False)"),
         ("rl/states.py", "import numbagg, richer"),

@@ -1,0 +1,13 @@
+"""The command line: ``tickwise`` and ``python -m tickwise``. A module is a command, or a few that belong together."""
+
+from tickwise.cli.app import app, main
+from tickwise.cli.automaton import automaton
+from tickwise.cli.check import check
+from tickwise.cli.compare import compare
+from tickwise.cli.infer import infer
+from tickwise.cli.reproduce import effect, report, reproduce
+
+for _each in (reproduce, infer, check, automaton, compare, report, effect):  # in the order of the help
+    app.command()(_each)
+
+__all__ = ["app", "main"]
