@@ -15,6 +15,16 @@ if TYPE_CHECKING:
     from tickwise.automata.model import TimedAutomaton
     from tickwise.automata.ticks import TickTable
     from tickwise.envs.gridworld import GridWorld
+    from tickwise.envs.wrappers import (
+        CollectTrajectories,
+        ExtendedState,
+        Labelled,
+        PotentialShaping,
+        TauState,
+        TimedTask,
+        VectorExtendedState,
+        VectorLabelled,
+    )
     from tickwise.errors import TickwiseError
     from tickwise.inference.classifier import MITLClassifier
     from tickwise.inference.information import information_gain, probability
@@ -33,16 +43,24 @@ __all__ = [
     "SDNF",
     "Box",
     "BoxPrior",
+    "CollectTrajectories",
+    "ExtendedState",
     "Formula",
     "GridWorld",
+    "Labelled",
     "LabelledTrajectories",
     "MITLClassifier",
     "MarkovPrior",
     "PathPrior",
+    "PotentialShaping",
     "Primitive",
+    "TauState",
     "TickTable",
     "TickwiseError",
     "TimedAutomaton",
+    "TimedTask",
+    "VectorExtendedState",
+    "VectorLabelled",
     "Verdict",
     "information_gain",
     "parse",
@@ -60,6 +78,16 @@ _HOMES = {
     "automata.model": ("TimedAutomaton",),
     "automata.ticks": ("TickTable",),
     "envs.gridworld": ("GridWorld",),
+    "envs.wrappers": (
+        "CollectTrajectories",
+        "ExtendedState",
+        "Labelled",
+        "PotentialShaping",
+        "TauState",
+        "TimedTask",
+        "VectorExtendedState",
+        "VectorLabelled",
+    ),
     "errors": ("TickwiseError",),
     "inference.classifier": ("MITLClassifier",),
     "inference.information": ("information_gain", "probability"),

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from tickwise._files import write_bytes
 from tickwise.errors import MissingFileError, StoreError
 from tickwise.experiments import artefacts
-from tickwise.experiments.store import Store, read_json, write_bytes, write_json
+from tickwise.experiments.store import Store, read_json, write_json
 
 ARRAYS = {"b": np.arange(6, dtype=np.int32).reshape(2, 3), "a": np.array([0.5, np.nan])}
 

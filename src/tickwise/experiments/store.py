@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,13 +10,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from tickwise._files import TEMPORARY, write_bytes
 from tickwise.errors import MissingFileError, StoreError
 from tickwise.experiments.artefacts import Artefact, json_bytes, named_arrays, parse_json
 
 FORMAT = 2
 """Changes whenever old artefacts can no longer be read or would be computed in another way."""
-
-_TEMPORARY = ".tmp"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,7 +100,7 @@ class Store:
 
     def sweep(self) -> None:
         """Remove what writers left that were killed half-way; call it when nothing is writing any more."""
-        for left in (self.folder / "artefacts").glob(f".*{_TEMPORARY}"):
+        for left in (self.folder / "artefacts").glob(f".*{TEMPORARY}"):
             left.unlink(missing_ok=True)
 
     def _manifest(self, name: str) -> Path:
@@ -142,32 +140,6 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode())
 
 
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file atomically: a reader, or a resumed run, sees all of it or nothing.
-
-    Raises:
-        StoreError: If it cannot be written, for instance because the disk is full; nothing is left behind.
-    """
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{_TEMPORARY}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        for old in path.parent.glob(f".{path.name}.*{_TEMPORARY}"):  # of a process that was killed
-            old.unlink(missing_ok=True)
-        try:
-            with temporary.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            temporary.replace(path)
-        finally:
-            temporary.unlink(missing_ok=True)
-    except OSError as error:
-        raise StoreError(
-            f"cannot write {path}: {error.strerror}; make room or choose another folder, and run the same command "
-            "again: what is finished is kept"
-        ) from error
-
-
 def read_json(path: Path) -> Any:
     """Read a JSON file.
 
@@ -196,7 +168,7 @@ def _holds_files(folder: Path) -> bool:
 
 
 def _foreign(folder: Path) -> Iterator[Path]:
-    return (path for path in folder.iterdir() if not path.match(f".config.json.*{_TEMPORARY}"))
+    return (path for path in folder.iterdir() if not path.match(f".config.json.*{TEMPORARY}"))
 
 
 def _difference(found: Any, wanted: Any, path: str = "") -> str:

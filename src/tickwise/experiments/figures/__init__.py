@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tickwise._files import write_bytes
 from tickwise.automata.model import TimedAutomaton
 from tickwise.errors import AutomatonError
-from tickwise.experiments.store import write_bytes
 from tickwise.experiments.study import StudySpec
 
 if TYPE_CHECKING:

@@ -1,0 +1,184 @@
+"""The forms in which location and clocks join an observation: a dictionary, one flat vector, or one number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from tickwise.automata.monitor import Monitor
+from tickwise.errors import ConfigurationError
+
+Observe = Callable[[Any, NDArray[np.int64], NDArray[np.int64]], Any]
+"""Joins an observation, a disjunct and its table state, for one environment or with a first axis for many."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Places:
+    """Locations and clocks of all disjuncts in one numbering.
+
+    Attributes:
+        locations: How many locations there are, those of one disjunct after those of another.
+        clocks: The greatest number of clocks of a disjunct.
+        longest: The greatest value of a clock, in ticks, and at least 1.
+        first_location: The number of each disjunct's first location, shape ``(disjuncts,)``.
+        first_state: The number of each disjunct's first table state, shape ``(disjuncts,)``.
+        location_of: The location of each table state, shape ``(table states,)``.
+        clocks_of: The clock values of each table state, 0 where a disjunct has fewer clocks, shape ``(table states,
+            clocks)``.
+    """
+
+    locations: int
+    clocks: int
+    longest: int
+    first_location: NDArray[np.int64]
+    first_state: NDArray[np.int64]
+    location_of: NDArray[np.int64]
+    clocks_of: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, monitor: Monitor) -> Places:
+        """Number the locations and the table states of a monitor's disjuncts."""
+        tables = monitor.tables
+        sizes = [len(table.automaton.locations) for table in tables]
+        first_location = np.concatenate([[0], np.cumsum(sizes)])[:-1]
+        first_state = np.concatenate([[0], np.cumsum([len(table) for table in tables])])
+        width = max(table.clocks.shape[1] for table in tables)
+        clocks = np.zeros((first_state[-1], width), dtype=np.int64)
+        for first, table in zip(first_state, tables, strict=False):
+            clocks[first : first + len(table), : table.clocks.shape[1]] = table.clocks
+        location = np.concatenate([first + table.location for first, table in zip(first_location, tables, strict=True)])
+        longest = max(1, int(clocks.max(initial=0)))
+        return cls(sum(sizes), width, longest, first_location, first_state[:-1], location.astype(np.int64), clocks)
+
+    def number(self, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The number of a disjunct's table state among all."""
+        return np.asarray(self.first_state[disjunct] + state, dtype=np.int64)
+
+
+def make_form(form: str, space: gymnasium.Space[Any], monitor: Monitor) -> tuple[gymnasium.Space[Any], Observe]:
+    """A form of the extended state.
+
+    Args:
+        form: ``"dict"``, ``"flat"`` or ``"discrete"``.
+        space: The space of the observations.
+        monitor: The formula's automata.
+
+    Returns:
+        The space of extended observations, and the function that makes them.
+
+    Raises:
+        ConfigurationError: If there is no such form, or the observation does not allow it.
+    """
+    forms = {"dict": _as_dict, "flat": _as_flat, "discrete": _as_discrete}
+    if form not in forms:
+        raise ConfigurationError(f"there is no form {form!r}; use one of {', '.join(map(repr, forms))}")
+    return forms[form](space, Places.of(monitor))
+
+
+def _as_dict(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
+    inner = dict(space.spaces) if isinstance(space, spaces.Dict) else {"observation": space}
+    taken = {"location", "clocks"} & inner.keys()
+    if taken:
+        raise ConfigurationError(
+            f"the observation has an entry {min(taken)!r} already; rename it, or use another form than 'dict'"
+        )
+    shape = (places.clocks,)
+    extended = spaces.Dict(
+        inner
+        | {
+            "location": spaces.Discrete(places.locations),
+            "clocks": spaces.Box(0, places.longest, shape, dtype=np.float32),
+        }
+    )
+
+    def observe(observation: Any, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> dict[str, Any]:
+        number = places.number(disjunct, state)
+        entries = dict(observation) if isinstance(space, spaces.Dict) else {"observation": observation}
+        location = places.location_of[number]
+        return entries | {"location": location, "clocks": places.clocks_of[number].astype(np.float32)}
+
+    return extended, observe
+
+
+def _as_flat(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
+    inner = _flat_box(space)
+    low = np.concatenate([inner.low, np.zeros(places.locations + places.clocks, np.float32)])
+    high = np.concatenate([inner.high, np.ones(places.locations + places.clocks, np.float32)])
+    one_hot = np.eye(places.locations, dtype=np.float32)
+
+    def observe(observation: Any, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> NDArray[np.float32]:
+        number = places.number(disjunct, state)
+        clocks = (places.clocks_of[number] / places.longest).astype(np.float32)
+        return np.concatenate([_flat(space, observation), one_hot[places.location_of[number]], clocks], axis=-1)
+
+    return spaces.Box(low, high, dtype=np.float32), observe
+
+
+def _as_discrete(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
+    count, number_of = numbering(space, "form='discrete'")
+
+    def observe(observation: Any, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> NDArray[np.int64]:
+        return np.asarray(places.number(disjunct, state) * count + number_of(observation))[()]
+
+    return spaces.Discrete(len(places.location_of) * count), observe
+
+
+def numbering(space: gymnasium.Space[Any], what: str) -> tuple[int, Callable[[Any], NDArray[np.int64]]]:
+    """How many observations a finite space has, and the number of each.
+
+    Args:
+        space: A Discrete or a MultiDiscrete space.
+        what: What needs it.
+
+    Returns:
+        The count, and a function from observations to numbers from 0; it keeps axes before an observation's own.
+
+    Raises:
+        ConfigurationError: If the space is not finite.
+    """
+    if isinstance(space, spaces.Discrete):
+        return int(space.n), lambda observation: np.asarray(observation, dtype=np.int64) - int(space.start)
+    if isinstance(space, spaces.MultiDiscrete) and len(space.shape) == 1:
+        places = np.concatenate([np.cumprod(space.nvec[::-1], dtype=np.int64)[::-1][1:], [1]])
+        return int(np.prod(space.nvec)), lambda observation: (np.asarray(observation) - space.start) @ places
+    raise ConfigurationError(
+        f"{what} needs observations that are whole numbers, a Discrete or MultiDiscrete space, not {space}; use "
+        "another form, or map the observation with gymnasium.wrappers.TransformObservation"
+    )
+
+
+def _flat_box(space: gymnasium.Space[Any]) -> spaces.Box:
+    """The space of an observation as one vector of float32."""
+    flat = spaces.flatten_space(space) if space.is_np_flattenable else None
+    if not isinstance(flat, spaces.Box):
+        raise ConfigurationError(f"an observation in {space} is no vector when flattened; use form='dict'")
+    low, high = flat.low.astype(np.float32), flat.high.astype(np.float32)
+    return spaces.Box(low, high, dtype=np.float32)
+
+
+def _flat(space: gymnasium.Space[Any], observation: Any) -> NDArray[np.float32]:
+    """What `gymnasium.spaces.flatten` gives, also with a first axis for many."""
+    if isinstance(space, spaces.Discrete):
+        return np.asarray(np.eye(int(space.n), dtype=np.float32)[np.asarray(observation) - int(space.start)])
+    if isinstance(space, spaces.MultiDiscrete):
+        entries = (np.asarray(observation) - space.start).reshape(*_leading(space, observation), -1)
+        parts = [np.eye(n, dtype=np.float32)[entries[..., i]] for i, n in enumerate(space.nvec.ravel())]
+        return np.concatenate(parts, axis=-1)
+    if isinstance(space, spaces.Dict):
+        return np.concatenate([_flat(part, observation[key]) for key, part in space.spaces.items()], axis=-1)
+    if isinstance(space, spaces.Tuple):
+        parts = [_flat(part, each) for part, each in zip(space.spaces, observation, strict=True)]
+        return np.concatenate(parts, axis=-1)
+    return np.asarray(observation, dtype=np.float32).reshape(*_leading(space, observation), -1)
+
+
+def _leading(space: gymnasium.Space[Any], observation: Any) -> tuple[int, ...]:
+    """The axes before an observation's own."""
+    shape: tuple[int, ...] = np.shape(observation)
+    return shape[: len(shape) - len(space.shape or ())]

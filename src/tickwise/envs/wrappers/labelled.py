@@ -1,0 +1,138 @@
+"""Named features of any environment's observations: what the predicates of formulas speak of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, SupportsFloat, TypeAlias
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import RecordConstructorArgs
+from numpy.typing import NDArray
+
+from tickwise.errors import ConfigurationError, DataError
+
+FEATURES = "features"
+"""The key in ``info`` under which a tick's features are found."""
+
+FeatureMap: TypeAlias = Mapping[str, Callable[[Any], SupportsFloat]] | Sequence[str]
+
+
+class Features:
+    """A map from observations to named features.
+
+    Args:
+        given: For each name a function of the observation; or names alone, for the entries of an observation that
+            is a vector or one number.
+        space: The space of the observations.
+
+    Attributes:
+        names: The names, in order.
+
+    Raises:
+        ConfigurationError: If there is no feature, a name occurs twice, or names do not fit the observation.
+    """
+
+    def __init__(self, given: FeatureMap, space: gymnasium.Space[Any]) -> None:
+        self.names = tuple(given)
+        if not self.names or isinstance(given, str):
+            raise ConfigurationError(f"features are {given!r}; give a list of names, or a function for each name")
+        if len(set(self.names)) < len(self.names):
+            raise ConfigurationError(f"a feature's name occurs twice in {', '.join(self.names)}; make them unique")
+        self._functions = list(given.values()) if isinstance(given, Mapping) else None
+        if self._functions is None:
+            _check_entries(self.names, space)
+
+    def __call__(self, observation: Any) -> NDArray[np.float64]:
+        """The features of one observation, shape ``(features,)``.
+
+        Raises:
+            DataError: If a feature is NaN.
+        """
+        if self._functions is None:
+            values = np.atleast_1d(np.asarray(observation, dtype=np.float64))
+        else:
+            values = np.array([float(function(observation)) for function in self._functions])
+        if np.isnan(values).any():
+            name = self.names[int(np.argmax(np.isnan(values)))]
+            raise DataError(f"the feature {name!r} is NaN; a predicate needs a number at every tick")
+        return values
+
+
+def _check_entries(names: Sequence[str], space: gymnasium.Space[Any]) -> None:
+    if isinstance(space, spaces.Discrete):
+        entries = 1
+    elif isinstance(space, (spaces.Box, spaces.MultiDiscrete, spaces.MultiBinary)) and len(space.shape) == 1:
+        entries = space.shape[0]
+    else:
+        raise ConfigurationError(
+            f"an observation in {space} is no vector, so its entries have no names; give features as functions of it, "
+            "such as {'x': lambda observation: ...}"
+        )
+    if entries != len(names):
+        raise ConfigurationError(
+            f"there are {len(names)} names ({', '.join(names)}) for {entries} entries of the observation; name each"
+        )
+
+
+class Labelled(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
+    """Put named features of the observation into ``info["features"]``, at every tick.
+
+    Predicates are read on these features (the labelling function of Section II-A): the wrappers `ExtendedState`,
+    `TimedTask` and `CollectTrajectories` stand on this one. The observation stays what it is.
+
+    ```python
+    env = gymnasium.make("FrozenLake-v1")
+    env = Labelled(env, {"row": lambda s: s // 4, "column": lambda s: s % 4})
+    ```
+
+    Args:
+        env: Any environment.
+        features: For each feature's name a function of the observation; or names alone, for the entries of an
+            observation that is a vector or one number.
+
+    Attributes:
+        feature_names: The names, in the order of the columns of ``info["features"]``, float64, shape ``(features,)``.
+
+    Raises:
+        ConfigurationError: If there is no feature, a name occurs twice, or names do not fit the observation.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], features: FeatureMap) -> None:
+        RecordConstructorArgs.__init__(self, features=features)
+        super().__init__(env)
+        self._features = Features(features, env.observation_space)
+        self.feature_names = self._features.names
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode; see the wrapped environment."""
+        observation, info = self.env.reset(seed=seed, options=options)
+        return observation, info | {FEATURES: self._features(observation)}
+
+    def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Go to the next tick; see the wrapped environment."""
+        observation, reward, terminated, truncated, info = self.env.step(action)
+        return observation, reward, terminated, truncated, info | {FEATURES: self._features(observation)}
+
+
+def feature_names(env: Any, wrapper: str) -> tuple[str, ...]:
+    """The names of the features that an environment tells of.
+
+    Args:
+        env: An environment, or a vector of environments.
+        wrapper: Which wrapper asks.
+
+    Returns:
+        The names.
+
+    Raises:
+        ConfigurationError: If the environment is not labelled.
+    """
+    below = env
+    while below is not None:
+        found = getattr(below, "feature_names", None)
+        if found is not None:
+            return tuple(found)
+        below = getattr(below, "env", None)
+    raise ConfigurationError(f"{wrapper} needs named features; wrap the environment in Labelled(env, features) first")
