@@ -141,7 +141,8 @@ def test_similar_states_keep_the_heading_and_prefer_a_state_that_agrees_on_the_p
     target = to_sdnf(parse("F[0,5] (5 <= x <= 6 & 6 <= y <= 7)")).disjuncts[0].primitives[0]
     world = GridWorld(9)
     mdp = world.mdp()
-    similar = similar_states(mdp, source, mdp, target)
+    centres = [each.box.centroid(mdp.variables, mdp.limits) for each in (source, target)]
+    similar = similar_states(mdp, source.predicate, centres[0], mdp, target.predicate, centres[1])
     # centroids (3.5, 4) and (5.5, 6.5): a target cell lies half a cell between two source cells, and the one that is
     # in the region iff the target cell is in its own is taken
     for heading in range(4):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,8 +11,8 @@ from tickwise.automata.mapping import Bijections, bijections
 from tickwise.automata.ticks import TickTable
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.errors import AutomatonError, DataError
-from tickwise.logic.sdnf import Primitive
 from tickwise.logic.semantics import holds
+from tickwise.logic.syntax import Predicate
 from tickwise.rl.states import Memory
 
 
@@ -21,6 +23,7 @@ def transfer_q(
     target_mdp: TabularMDP,
     target_memory: Memory,
     initial: float,
+    landmarks: tuple[Sequence[NDArray[np.float64]], Sequence[NDArray[np.float64]]] | None = None,
 ) -> NDArray[np.float32]:
     """Transfer an extended Q-function from the source to the target task (Algorithm 2).
 
@@ -31,6 +34,9 @@ def transfer_q(
         target_mdp: The target's world; it has the source's actions.
         target_memory: The target's extended states, made of the tick tables of φ^T.
         initial: The value of table states that no episode learns in (the start, before the first letter).
+        landmarks: What states are compared relative to in the source and in the target, for each disjunct an array of
+            shape ``(primitives, variables)`` as `tickwise.transfer.landmarks` gives it; by default the regions'
+            centroids within the worlds' limits, as in the paper.
 
     Returns:
         Q̄^T, shape ``(target memory states, target states, actions)``.
@@ -47,11 +53,12 @@ def transfer_q(
         i_hat = i % len(source_memory.tables)  # line 4
         source = source_memory.tables[i_hat]
         xi = bijections(target.automaton, source.automaton)
+        near = _centroids(source, source_mdp) if landmarks is None else landmarks[0][i_hat]
+        far = _centroids(target, target_mdp) if landmarks is None else landmarks[1][i]
+        pairs = zip(source.automaton.predicates, target.automaton.predicates, strict=True)
         states = [
-            similar_states(source_mdp, rho_source, target_mdp, rho_target)
-            for rho_source, rho_target in zip(
-                source.automaton.conjunction.primitives, target.automaton.conjunction.primitives, strict=True
-            )
+            similar_states(source_mdp, rho_source, near[j], target_mdp, rho_target, far[j])
+            for j, (rho_source, rho_target) in enumerate(pairs)
         ]
         similar_u = similar_valuations(source, target, xi)
         for u in range(1, len(target)):  # lines 2 and 8: every location and valuation
@@ -61,8 +68,19 @@ def transfer_q(
     return target_q
 
 
+def _centroids(table: TickTable, mdp: TabularMDP) -> NDArray[np.float64]:
+    """Cr(ρ) of each primitive's region, shape ``(primitives, variables)``."""
+    primitives = table.automaton.conjunction.primitives
+    return np.array([primitive.box.centroid(mdp.variables, mdp.limits) for primitive in primitives])
+
+
 def similar_states(
-    source_mdp: TabularMDP, source: Primitive, target_mdp: TabularMDP, target: Primitive
+    source_mdp: TabularMDP,
+    source: Predicate,
+    source_centre: NDArray[np.float64],
+    target_mdp: TabularMDP,
+    target: Predicate,
+    target_centre: NDArray[np.float64],
 ) -> NDArray[np.int64]:
     """Line 6: for each target state the source state that lies most alike relative to the region's centroid.
 
@@ -72,20 +90,22 @@ def similar_states(
 
     Args:
         source_mdp: The source's world.
-        source: The primitive with ρ^S.
+        source: The predicate ρ^S.
+        source_centre: Its region's centroid, or another landmark, shape ``(variables,)``.
         target_mdp: The target's world.
-        target: The primitive with ρ^{j,T}.
+        target: The predicate ρ^{j,T}.
+        target_centre: Its region's centroid, or another landmark.
 
     Returns:
         Source states, shape ``(target states,)``.
     """
     source_cells, target_cells = source_mdp.cell_coordinates, target_mdp.cell_coordinates
-    source_relative = source_cells - source.box.centroid(source_mdp.variables, source_mdp.limits)
-    target_relative = target_cells - target.box.centroid(target_mdp.variables, target_mdp.limits)
+    source_relative = source_cells - source_centre
+    target_relative = target_cells - target_centre
     distance = ((target_relative[:, None, :] - source_relative[None, :, :]) ** 2).sum(axis=2)
     differs = (
-        holds(target.predicate, target_cells, target_mdp.variables)[:, None]
-        != holds(source.predicate, source_cells, source_mdp.variables)[None, :]
+        holds(target, target_cells, target_mdp.variables)[:, None]
+        != holds(source, source_cells, source_mdp.variables)[None, :]
     )
     # distances between grid points differ by far more than rounding does
     rank = np.lexsort((differs, np.round(distance, 9)), axis=1)
