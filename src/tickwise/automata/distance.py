@@ -15,7 +15,8 @@ def ticks_to_acceptance(table: TickTable) -> NDArray[np.int64]:
         table: A compiled automaton.
 
     Returns:
-        Ticks, shape ``(U,)``: 0 for accepting states, -1 where no word leads to acceptance.
+        Ticks, shape ``(U,)``: 0 for accepting states, -1 where no word leads to acceptance. State 0 has not read the
+        letter of tick 0 yet, so that its number counts letters and is one more than the tick.
     """
     ticks = np.where(table.verdict > 0, 0, -1).astype(np.int64)
     distance = 0

@@ -114,8 +114,10 @@ class Monitor:
                 value = values[..., self.variables.index(bound.variable)]
                 if np.isfinite(bound.lower) and np.isfinite(bound.upper):
                     away = value - (bound.lower + bound.upper) / 2
+                elif np.isfinite(bound.lower):
+                    away = np.minimum(value - bound.lower, 0.0)
                 else:
-                    away = value - np.clip(value, bound.lower, bound.upper)
+                    away = np.maximum(value - bound.upper, 0.0)
                 distances[index] = distances[index] + away**2
         return np.asarray(np.argmin(np.sqrt(distances), axis=0), dtype=np.int64)
 
