@@ -66,12 +66,7 @@ class FormulaTask:
         if self.ends not in ENDINGS:
             raise ConfigurationError(f"there is no end of an episode {self.ends!r}; use {', '.join(ENDINGS)}")
         check_ticks("deadline", self.deadline, least=1)
-        end = max(disjunct.primitives[-1].end for disjunct in self.sdnf.disjuncts)
-        if end > self.deadline:
-            raise ConfigurationError(
-                f"{self.formula} has effect until tick {end}, past the deadline {self.deadline}; "
-                f"use a deadline of {end} or more"
-            )
+        check_end(self.sdnf, self.deadline)
 
     @property
     def sdnf(self) -> SDNF:
@@ -96,6 +91,19 @@ class FormulaTask:
             ConfigurationError: If a region contains no cell of the world, or the table would be too large.
         """
         return sdnf_table(self.sdnf, mdp, self.deadline, reward=self.reward, penalty=self.penalty, ends=self.ends)
+
+
+def check_end(sdnf: SDNF, deadline: int) -> None:
+    """Check that a formula has no effect past a deadline.
+
+    Raises:
+        ConfigurationError: If the deadline is before its end-effect time (Definition 4).
+    """
+    end = max(disjunct.primitives[-1].end for disjunct in sdnf.disjuncts)
+    if end > deadline:
+        raise ConfigurationError(
+            f"{sdnf} has effect until tick {end}, past the deadline {deadline}; use a deadline of {end} or more"
+        )
 
 
 def sdnf_table(

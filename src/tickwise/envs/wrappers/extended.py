@@ -78,7 +78,7 @@ class ExtendedState(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         super().__init__(env)
         self.monitor = Monitor.of(formula, feature_names(env, "ExtendedState"), reduce=reduce)
         self._places = Places.of(self.monitor)
-        self.observation_space, self._observe = make_form(form, env.observation_space, self.monitor)
+        self.observation_space, self._observe = make_form(form, env.observation_space, self._places)
         self._states = np.zeros(len(self.monitor.tables), dtype=np.int64)
         self._disjunct = np.zeros((), dtype=np.int64)
 
@@ -116,10 +116,9 @@ def report(monitor: Monitor, places: Places, disjunct: NDArray[np.int64], states
     """
     state = np.take_along_axis(states, np.expand_dims(np.asarray(disjunct), -1), axis=-1)[..., 0]
     number = places.number(disjunct, state)
-    stages = np.concatenate([table.stage for table in monitor.tables]).astype(np.int64)
     entries = {
         "location": places.location_of[number],
-        "stage": stages[number],
+        "stage": places.stage_of[number],
         "verdict": monitor.verdict(states).astype(np.int64),
         TABLE_STATE: number,
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -12,10 +13,16 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from tickwise.automata.monitor import Monitor
-from tickwise.errors import ConfigurationError
+from tickwise.errors import ConfigurationError, DataError
 
 Observe = Callable[[Any, NDArray[np.int64], NDArray[np.int64]], Any]
 """Joins an observation, a disjunct and its table state, for one environment or with a first axis for many."""
+
+
+_MOST_NUMBERS = 2**62
+"""As many observations, or more, are not numbered."""
+
+_PLAIN = (spaces.Box, spaces.Discrete, spaces.MultiDiscrete, spaces.MultiBinary)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +38,7 @@ class Places:
         location_of: The location of each table state, shape ``(table states,)``.
         clocks_of: The clock values of each table state, 0 where a disjunct has fewer clocks, shape ``(table states,
             clocks)``.
+        stage_of: The primitive that each table state works on, shape ``(table states,)``.
     """
 
     locations: int
@@ -40,6 +48,7 @@ class Places:
     first_state: NDArray[np.int64]
     location_of: NDArray[np.int64]
     clocks_of: NDArray[np.int64]
+    stage_of: NDArray[np.int64]
 
     @classmethod
     def of(cls, monitor: Monitor) -> Places:
@@ -53,21 +62,24 @@ class Places:
         for first, table in zip(first_state, tables, strict=False):
             clocks[first : first + len(table), : table.clocks.shape[1]] = table.clocks
         location = np.concatenate([first + table.location for first, table in zip(first_location, tables, strict=True)])
+        stages = np.concatenate([table.stage for table in tables]).astype(np.int64)
         longest = max(1, int(clocks.max(initial=0)))
-        return cls(sum(sizes), width, longest, first_location, first_state[:-1], location.astype(np.int64), clocks)
+        return cls(
+            sum(sizes), width, longest, first_location, first_state[:-1], location.astype(np.int64), clocks, stages
+        )
 
     def number(self, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> NDArray[np.int64]:
         """The number of a disjunct's table state among all."""
         return np.asarray(self.first_state[disjunct] + state, dtype=np.int64)
 
 
-def make_form(form: str, space: gymnasium.Space[Any], monitor: Monitor) -> tuple[gymnasium.Space[Any], Observe]:
+def make_form(form: str, space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
     """A form of the extended state.
 
     Args:
         form: ``"dict"``, ``"flat"`` or ``"discrete"``.
         space: The space of the observations.
-        monitor: The formula's automata.
+        places: The locations and clocks of the formula's automata.
 
     Returns:
         The space of extended observations, and the function that makes them.
@@ -78,7 +90,7 @@ def make_form(form: str, space: gymnasium.Space[Any], monitor: Monitor) -> tuple
     forms = {"dict": _as_dict, "flat": _as_flat, "discrete": _as_discrete}
     if form not in forms:
         raise ConfigurationError(f"there is no form {form!r}; use one of {', '.join(map(repr, forms))}")
-    return forms[form](space, Places.of(monitor))
+    return forms[form](space, places)
 
 
 def _as_dict(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
@@ -122,11 +134,14 @@ def _as_flat(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Spa
 
 def _as_discrete(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
     count, number_of = numbering(space, "form='discrete'")
+    states = len(places.location_of) * count
+    if states >= _MOST_NUMBERS:
+        raise ConfigurationError(f"form='discrete' would number {states} extended states; use another form")
 
     def observe(observation: Any, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> NDArray[np.int64]:
         return np.asarray(places.number(disjunct, state) * count + number_of(observation))[()]
 
-    return spaces.Discrete(len(places.location_of) * count), observe
+    return spaces.Discrete(states), observe
 
 
 def numbering(space: gymnasium.Space[Any], what: str) -> tuple[int, Callable[[Any], NDArray[np.int64]]]:
@@ -143,31 +158,53 @@ def numbering(space: gymnasium.Space[Any], what: str) -> tuple[int, Callable[[An
         ConfigurationError: If the space is not finite.
     """
     if isinstance(space, spaces.Discrete):
-        return int(space.n), lambda observation: np.asarray(observation, dtype=np.int64) - int(space.start)
+        return int(space.n), lambda observation: _counted(space, observation)
     if isinstance(space, spaces.MultiDiscrete) and len(space.shape) == 1:
+        count = math.prod(space.nvec.tolist())
+        if count >= _MOST_NUMBERS:
+            raise ConfigurationError(f"{what} needs observations that can be numbered, and there are {count}")
         places = np.concatenate([np.cumprod(space.nvec[::-1], dtype=np.int64)[::-1][1:], [1]])
-        return int(np.prod(space.nvec)), lambda observation: (np.asarray(observation) - space.start) @ places
+        return count, lambda observation: _counted(space, observation) @ places
     raise ConfigurationError(
         f"{what} needs observations that are whole numbers, a Discrete or MultiDiscrete space, not {space}; use "
         "another form, or map the observation with gymnasium.wrappers.TransformObservation"
     )
 
 
+def _counted(space: spaces.Discrete | spaces.MultiDiscrete, observation: Any) -> NDArray[np.int64]:
+    """Whole numbers from 0 instead of from where the space starts; what lies outside it is refused."""
+    _leading(space, observation)
+    entries = np.asarray(observation, dtype=np.int64) - space.start
+    sizes = space.n if isinstance(space, spaces.Discrete) else space.nvec
+    if ((entries < 0) | (entries >= sizes)).any():
+        raise DataError(f"the observation {observation!r} is not in {space}; correct the environment or its space")
+    return np.asarray(entries, dtype=np.int64)
+
+
 def _flat_box(space: gymnasium.Space[Any]) -> spaces.Box:
     """The space of an observation as one vector of float32."""
-    flat = spaces.flatten_space(space) if space.is_np_flattenable else None
+    flat = spaces.flatten_space(space) if all(isinstance(part, _PLAIN) for part in _parts(space)) else None
     if not isinstance(flat, spaces.Box):
         raise ConfigurationError(f"an observation in {space} is no vector when flattened; use form='dict'")
-    low, high = flat.low.astype(np.float32), flat.high.astype(np.float32)
+    with np.errstate(over="ignore"):  # a bound beyond float32 is none
+        low, high = flat.low.astype(np.float32), flat.high.astype(np.float32)
     return spaces.Box(low, high, dtype=np.float32)
+
+
+def _parts(space: gymnasium.Space[Any]) -> list[gymnasium.Space[Any]]:
+    """The spaces that dictionaries and tuples are made of."""
+    if isinstance(space, (spaces.Dict, spaces.Tuple)):
+        inner = space.spaces.values() if isinstance(space, spaces.Dict) else space.spaces
+        return [part for each in inner for part in _parts(each)]
+    return [space]
 
 
 def _flat(space: gymnasium.Space[Any], observation: Any) -> NDArray[np.float32]:
     """What `gymnasium.spaces.flatten` gives, also with a first axis for many."""
     if isinstance(space, spaces.Discrete):
-        return np.asarray(np.eye(int(space.n), dtype=np.float32)[np.asarray(observation) - int(space.start)])
+        return np.asarray(np.eye(int(space.n), dtype=np.float32)[_counted(space, observation)])
     if isinstance(space, spaces.MultiDiscrete):
-        entries = (np.asarray(observation) - space.start).reshape(*_leading(space, observation), -1)
+        entries = _counted(space, observation).reshape(*_leading(space, observation), -1)
         parts = [np.eye(n, dtype=np.float32)[entries[..., i]] for i, n in enumerate(space.nvec.ravel())]
         return np.concatenate(parts, axis=-1)
     if isinstance(space, spaces.Dict):
@@ -175,10 +212,13 @@ def _flat(space: gymnasium.Space[Any], observation: Any) -> NDArray[np.float32]:
     if isinstance(space, spaces.Tuple):
         parts = [_flat(part, each) for part, each in zip(space.spaces, observation, strict=True)]
         return np.concatenate(parts, axis=-1)
-    return np.asarray(observation, dtype=np.float32).reshape(*_leading(space, observation), -1)
+    values = np.asarray(observation, dtype=np.float32)
+    return values.reshape(*_leading(space, values), -1)
 
 
 def _leading(space: gymnasium.Space[Any], observation: Any) -> tuple[int, ...]:
     """The axes before an observation's own."""
-    shape: tuple[int, ...] = np.shape(observation)
-    return shape[: len(shape) - len(space.shape or ())]
+    shape, own = np.shape(observation), tuple(space.shape or ())
+    if shape[len(shape) - len(own) :] != own:
+        raise DataError(f"an observation of shape {shape} is not in {space}; correct the environment or its space")
+    return tuple(shape[: len(shape) - len(own)])

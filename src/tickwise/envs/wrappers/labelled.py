@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import RecordConstructorArgs
+from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError, DataError
@@ -40,24 +41,39 @@ class Features:
             raise ConfigurationError(f"features are {given!r}; give a list of names, or a function for each name")
         if len(set(self.names)) < len(self.names):
             raise ConfigurationError(f"a feature's name occurs twice in {', '.join(self.names)}; make them unique")
+        for name in self.names:
+            if not isinstance(name, str) or not name:
+                raise ConfigurationError(f"a feature's name is {name!r}; use text")
         self._functions = list(given.values()) if isinstance(given, Mapping) else None
         if self._functions is None:
             _check_entries(self.names, space)
+        elif not all(callable(function) for function in self._functions):
+            raise ConfigurationError("a feature is no function; give each name a function of the observation")
 
     def __call__(self, observation: Any) -> NDArray[np.float64]:
         """The features of one observation, shape ``(features,)``.
 
         Raises:
-            DataError: If a feature is NaN.
+            DataError: If a feature is NaN or no number, or the observation has another number of entries than names.
         """
         if self._functions is None:
             values = np.atleast_1d(np.asarray(observation, dtype=np.float64))
+            if values.shape != (len(self.names),):
+                raise DataError(f"an observation of shape {values.shape} has no entries {', '.join(self.names)}")
         else:
-            values = np.array([float(function(observation)) for function in self._functions])
+            given = [function(observation) for function in self._functions]
+            values = np.array([_number(name, value) for name, value in zip(self.names, given, strict=True)])
         if np.isnan(values).any():
             name = self.names[int(np.argmax(np.isnan(values)))]
             raise DataError(f"the feature {name!r} is NaN; a predicate needs a number at every tick")
         return values
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise DataError(f"the feature {name!r} is {value!r}; let its function give one number") from None
 
 
 def _check_entries(names: Sequence[str], space: gymnasium.Space[Any]) -> None:
@@ -132,7 +148,17 @@ def feature_names(env: Any, wrapper: str) -> tuple[str, ...]:
     below = env
     while below is not None:
         found = getattr(below, "feature_names", None)
+        if found is None and isinstance(below, VectorEnv):
+            found = _names_within(below)
         if found is not None:
             return tuple(found)
         below = getattr(below, "env", None)
     raise ConfigurationError(f"{wrapper} needs named features; wrap the environment in Labelled(env, features) first")
+
+
+def _names_within(env: Any) -> tuple[str, ...] | None:
+    """The names that the environments of a vector tell, if they can be asked."""
+    # a process of its own ends with the first question that it cannot answer, so whether it can is asked before
+    if hasattr(env, "call") and all(env.call("has_wrapper_attr", "feature_names")):
+        return tuple(env.call("feature_names")[0])
+    return None

@@ -52,8 +52,8 @@ class VectorLabelled(VectorWrapper):
         infos = infos | {FEATURES: self._of(observations)}
         if _LAST_OBSERVATION in infos:
             last = np.zeros((self.num_envs, len(self.feature_names)))
-            for row, observation in zip(last, infos[_LAST_OBSERVATION], strict=True):
-                row[:] = 0 if observation is None else self._features(observation)
+            for row in np.flatnonzero(np.asarray(terminations) | np.asarray(truncations)):
+                last[row] = self._features(infos[_LAST_OBSERVATION][row])
             infos[_LAST_INFO] = infos.get(_LAST_INFO, {}) | {FEATURES: last}
         return observations, rewards, terminations, truncations, infos
 
@@ -70,7 +70,7 @@ class VectorExtendedState(VectorWrapper):
 
     Args:
         env: A vector of environments with named features: wrap it in `VectorLabelled`, or each environment in
-            `Labelled` and in nothing above it.
+            `Labelled`.
         formula: As for `ExtendedState`.
         form: As for `ExtendedState`.
         reduce: As for `ExtendedState`.
@@ -90,9 +90,9 @@ class VectorExtendedState(VectorWrapper):
         super().__init__(env)
         self.monitor = Monitor.of(formula, feature_names(env, "VectorExtendedState"), reduce=reduce)
         self._places = Places.of(self.monitor)
-        self.single_observation_space, self._observe = make_form(form, env.single_observation_space, self.monitor)
+        self.single_observation_space, self._observe = make_form(form, env.single_observation_space, self._places)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self._mode = env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP)
+        self._mode = AutoresetMode(env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP))
         self._states = np.zeros((self.num_envs, len(self.monitor.tables)), dtype=np.int64)
         self._disjunct = np.zeros(self.num_envs, dtype=np.int64)
         self._ended = np.zeros(self.num_envs, dtype=np.bool_)
