@@ -28,12 +28,14 @@ class QTable:
         n_actions: The number of actions.
 
     Raises:
-        ConfigurationError: If there is no action.
+        ConfigurationError: If there is no action, or the initial value is not finite.
     """
 
     def __init__(self, n_actions: int, initial: InitialValues = 0.0) -> None:
         if n_actions < 1:
             raise ConfigurationError(f"there are {n_actions} actions; a table needs at least one")
+        if not callable(initial) and not np.isfinite(initial):
+            raise ConfigurationError(f"the initial Q-value is {initial}; use a finite number")
         self.n_actions = int(n_actions)
         self._initial = initial
         self._rows: dict[Hashable, int] = {}

@@ -7,6 +7,7 @@ from typing import Any, Protocol, SupportsFloat
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise.errors import ConfigurationError
 from tickwise.rl.qlearning import QSettings
 from tickwise.rl.qtable import QTable
 
@@ -41,7 +42,11 @@ def learn_by_steps(
 
     Returns:
         The undiscounted return of each episode, shape ``(episodes,)``.
+
+    Raises:
+        ConfigurationError: If the environment has another number of actions than the table.
     """
+    _check_actions(env, q)
     returns = np.zeros(episodes)
     for episode in range(episodes):
         observation, _ = env.reset()
@@ -71,7 +76,11 @@ def play_by_steps(env: Environment, q: QTable, episodes: int, seed: int) -> NDAr
 
     Returns:
         The undiscounted return of each episode, shape ``(episodes,)``.
+
+    Raises:
+        ConfigurationError: As `learn_by_steps`.
     """
+    _check_actions(env, q)
     returns = np.zeros(episodes)
     for episode in range(episodes):
         observation, _ = env.reset(seed=seed if episode == 0 else None)
@@ -81,6 +90,15 @@ def play_by_steps(env: Environment, q: QTable, episodes: int, seed: int) -> NDAr
             returns[episode] += float(reward)
             over = terminated or truncated
     return returns
+
+
+def _check_actions(env: Environment, q: QTable) -> None:
+    space: Any = getattr(env, "action_space", None)
+    if space is not None and (getattr(space, "n", None) != q.n_actions or getattr(space, "start", 0) != 0):
+        raise ConfigurationError(
+            f"the table has {q.n_actions} actions and the environment {space}; "
+            "make the table for actions that are numbers from 0"
+        )
 
 
 def _draw_action(values: NDArray[np.float32], epsilon: float, number: float) -> int:

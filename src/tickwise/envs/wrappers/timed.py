@@ -20,10 +20,10 @@ from tickwise.logic.syntax import Formula
 class TimedTask(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """Reward an episode for a formula instead of what the environment rewards.
 
-    The agent is not told the formula, nor how far it is. The episode terminates at the deadline, at the end of the
-    environment's own episode (be it by truncation), or before as `ends` says; then ``reward`` is given if the formula is satisfied, and
-    ``penalty`` if not, and ``info["is_success"]`` says which. Where the episode ends with the formula undecided, it
-    is not satisfied. It is what `FormulaTask` is for a gridworld.
+    The agent is not told the formula, nor how far it is. The episode terminates at the deadline, where the
+    environment's own episode ends or is truncated, or before as `ends` says; then ``reward`` is given if the formula
+    is satisfied, and ``penalty`` if not, and ``info["is_success"]`` says which. Where the episode ends with the
+    formula undecided, it is not satisfied. It is what `FormulaTask` is for a gridworld.
 
     Args:
         env: An environment with named features: wrap it in `Labelled` first.
