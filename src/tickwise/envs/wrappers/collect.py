@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import io
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +13,9 @@ import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 from numpy.typing import NDArray
 
-from tickwise._files import write_bytes
 from tickwise.envs.wrappers.labelled import FEATURES, feature_names
-from tickwise.errors import ConfigurationError
-
-_MOST_UNWRITTEN = 1_000
+from tickwise.envs.wrappers.recording import Recording
+from tickwise.errors import DataError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -27,11 +25,13 @@ class Episode:
     Attributes:
         features: The features at each tick, shape ``(ticks, features)``.
         total: The undiscounted return.
+        truncated: Whether it was cut off before an end of its own.
         info: The last ``info``.
     """
 
     features: NDArray[np.float64]
     total: float
+    truncated: bool
     info: dict[str, Any]
 
 
@@ -43,20 +43,24 @@ def succeeded(episode: Episode) -> bool:
 class CollectTrajectories(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     """Record the trajectory and the label of every finished episode, whoever acts (the data collection phase).
 
-    The file is an NPZ file as `read_trajectories` and ``tickwise infer`` read it. It is written, all or nothing, each
-    time that the number of episodes has doubled, or that 1,000 more have come, and by `close`. An episode that is cut
-    off by another `reset` is not recorded: it has no label.
+    The file is an NPZ file as `read_trajectories` and ``tickwise infer`` read it. `write` and `close` write it, all or
+    nothing, and so does the end of the program, be it by Ctrl-C or an error. Until then each episode is in a journal,
+    the file's name with ``.part``, as soon as it has finished: of a process that was killed, ``resume=True`` finds all
+    of them. An episode that is cut off by another `reset` is not recorded: it has no label.
 
     Args:
         env: An environment with named features: wrap it in `Labelled` first.
         path: The file, which must end in ``.npz``; None keeps the trajectories in memory only.
         label: Whether an episode was good (label 1, else -1); by default `succeeded`.
+        resume: Whether to go on with a file that is there already, or was begun; without it such a file is refused.
 
     Attributes:
         feature_names: The names of the trajectories' columns.
 
     Raises:
-        ConfigurationError: If the environment has no named features, or the file another ending.
+        ConfigurationError: If the environment has no named features, or the file has another ending or is there
+            already.
+        DataError: If a file to go on with has other features, or no episodes.
     """
 
     def __init__(
@@ -64,23 +68,21 @@ class CollectTrajectories(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstruct
         env: gymnasium.Env[Any, Any],
         path: str | Path | None = None,
         label: Callable[[Episode], bool] = succeeded,
+        *,
+        resume: bool = False,
     ) -> None:
-        RecordConstructorArgs.__init__(self, path=path, label=label)
+        RecordConstructorArgs.__init__(self, path=path, label=label, resume=resume)
         super().__init__(env)
         self.feature_names = feature_names(env, "CollectTrajectories")
-        self._path = None if path is None else Path(path)
-        if self._path is not None and self._path.suffix.lower() != ".npz":
-            raise ConfigurationError(f"{path} does not end in .npz; use that ending")
         self._label = label
-        self._finished: list[NDArray[np.float64]] = []
-        self._labels: list[int] = []
-        self._written = 0
+        self._recording = Recording(None if path is None else Path(path), self.feature_names, resume=resume)
+        weakref.finalize(self, self._recording.write)
         self._ticks: list[NDArray[np.float64]] = []
         self._total = 0.0
 
     def __len__(self) -> int:
         """The number of recorded episodes."""
-        return len(self._finished)
+        return len(self._recording.episodes)
 
     def trajectories(self) -> tuple[list[NDArray[np.float64]], NDArray[np.int64]]:
         """What was recorded, as `MITLClassifier.fit` and `LabelledTrajectories.from_arrays` take it.
@@ -88,25 +90,27 @@ class CollectTrajectories(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstruct
         Returns:
             A list of arrays of shape ``(ticks, features)``, and the labels 1 or -1, shape ``(episodes,)``.
         """
-        return list(self._finished), np.array(self._labels, dtype=np.int64)
+        return list(self._recording.episodes), np.array(self._recording.labels, dtype=np.int64)
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; see the wrapped environment."""
         observation, info = self.env.reset(seed=seed, options=options)
-        self._ticks, self._total = [info[FEATURES]], 0.0
+        self._ticks, self._total = [self._finite(info[FEATURES])], 0.0
         return observation, info
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
-        """Go to the next tick; at the last one of an episode its trajectory is recorded."""
+        """Go to the next tick; at the last one of an episode its trajectory is recorded.
+
+        Raises:
+            DataError: If a feature is infinite.
+            StoreError: If the journal cannot be written.
+        """
         observation, reward, terminated, truncated, info = self.env.step(action)
-        self._ticks.append(info[FEATURES])
+        self._ticks.append(self._finite(info[FEATURES]))
         self._total += float(reward)
         if terminated or truncated:
-            episode = Episode(np.array(self._ticks), self._total, info)
-            self._finished.append(episode.features)
-            self._labels.append(1 if self._label(episode) else -1)
-            if len(self) - self._written >= min(max(self._written, 1), _MOST_UNWRITTEN):
-                self.write()
+            episode = Episode(np.array(self._ticks), self._total, truncated and not terminated, info)
+            self._recording.add(episode.features, 1 if self._label(episode) else -1)
         return observation, reward, terminated, truncated, info
 
     def write(self) -> None:
@@ -115,18 +119,13 @@ class CollectTrajectories(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstruct
         Raises:
             StoreError: If it cannot be written; what is there already stays.
         """
-        if self._path is None or len(self) == self._written:
-            return
-        lengths = np.array([len(each) for each in self._finished], dtype=np.int64)
-        values = np.full((len(self), int(lengths.max()), len(self.feature_names)), np.nan)
-        for row, each in zip(values, self._finished, strict=True):
-            row[: len(each)] = each
-        content = io.BytesIO()
-        np.savez_compressed(
-            content, X=values, y=np.array(self._labels), names=np.array(self.feature_names), lengths=lengths
-        )
-        write_bytes(self._path, content.getvalue())
-        self._written = len(self)
+        self._recording.write()
+
+    def _finite(self, features: NDArray[np.float64]) -> NDArray[np.float64]:
+        if not np.isfinite(features).all():
+            name = self.feature_names[int(np.argmin(np.isfinite(features)))]
+            raise DataError(f"the feature {name!r} is infinite; trajectories need finite numbers, so clip it")
+        return features
 
     def close(self) -> None:
         """Write what was recorded, and close the environment."""
