@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import copy
 from collections import deque
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import gymnasium
 import numpy as np
+from gymnasium import wrappers
 from numpy.typing import NDArray
 
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.envs.tasks import TaskTable, check_ticks
-from tickwise.envs.wrappers.labelled import FeatureMap, Features
+from tickwise.envs.wrappers.collect import CollectTrajectories
+from tickwise.envs.wrappers.labelled import FeatureMap, Features, Labelled
 from tickwise.errors import ConfigurationError, DataError
 
 Outcome: TypeAlias = tuple[float, int, float]
@@ -22,6 +24,12 @@ Outcome: TypeAlias = tuple[float, int, float]
 
 _TRIALS = 3
 """Random streams under which a step has to go the same way for an environment to count as deterministic."""
+
+_WATCHING = (
+    wrappers.PassiveEnvChecker, wrappers.OrderEnforcing, wrappers.TimeLimit, wrappers.RecordEpisodeStatistics,
+    Labelled, CollectTrajectories,
+)  # fmt: skip
+"""Wrappers that leave observations, rewards and ends as an environment's own table has them."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,7 +40,8 @@ class Tabulation:
         mdp: The world; states with the same features but for the orientation are one cell.
         observations: The observation of each state; None for combinations of features that never occur.
         terminal: Whether the environment's own episode ends on arriving in a state, shape ``(states,)``.
-        reward: The environment's own reward of each outcome, float64, shape ``(states, actions, outcomes)``.
+        reward: The environment's own reward of each outcome, float64, shape ``(states, actions, outcomes)``. Where it
+            depends on the count of steps too, it is that of the shortest way.
     """
 
     mdp: TabularMDP
@@ -88,7 +97,7 @@ class Tabulation:
         if (arrival[successor] != reward).any():
             state = int(successor[np.argmax(arrival[successor] != reward)])
             raise DataError(
-                f"the reward of reaching {self.observations[state]!r} depends on where it is reached from; "
+                f"the reward of reaching {_short(self.observations[state])} depends on how it is reached; "
                 "learn over steps with tickwise.rl.stepping instead"
             )
         success = np.zeros(2, dtype=np.bool_)
@@ -117,8 +126,10 @@ def tabulate(
     An environment with a table of its own, as Gymnasium's toy texts have it (``P`` and ``initial_state_distrib``), is
     read from there. Any other one is enumerated: from the states that `seeds` lead to, each action is tried in a copy,
     until no new observation is found. That needs an environment that can be copied, whose steps are not random, and
-    whose observation tells its whole state (but for a count of steps); each of these is checked where it can be.
-    Truncation is not part of the table: the task's deadline ends an episode.
+    whose observation tells its whole state (but for a count of steps); each of these is checked where it can be: a
+    step is tried with other random numbers, and a state that was reached on a second way has to go on as on the first.
+    What wrappers make of an observation has to depend on the observation alone, not on the environment itself, which
+    is not the copy. Truncation is not part of the table: the task's deadline ends an episode.
 
     Args:
         env: The environment, with numbered actions.
@@ -132,16 +143,19 @@ def tabulate(
         The tables.
 
     Raises:
-        ConfigurationError: If the actions are not numbered, or a feature is wrong.
-        DataError: If the environment is random, its observation does not tell its state, or it has too many states.
+        ConfigurationError: If the actions are not numbered from 0, a feature is wrong, there is no seed, or a wrapper
+            changes what an environment's own table says.
+        DataError: If the environment is random or cannot be copied, its observation does not tell its state, or it has
+            too many states.
     """
-    if not isinstance(env.action_space, gymnasium.spaces.Discrete):
-        raise ConfigurationError(f"the actions are in {env.action_space}; a table needs numbered ones (Discrete)")
+    if not isinstance(env.action_space, gymnasium.spaces.Discrete) or env.action_space.start != 0:
+        raise ConfigurationError(f"the actions are in {env.action_space}; a table needs numbers from 0 (Discrete)")
     mapped = Features(features, env.observation_space)
     unknown = set(orientation) - set(mapped.names)
     if unknown:
         raise ConfigurationError(f"the orientation {min(unknown)!r} is no feature; use {', '.join(mapped.names)}")
-    found = _from_table(env) if hasattr(env.unwrapped, "P") else _enumerated(env, tuple(seeds), most)
+    own = hasattr(env.unwrapped, "P") and hasattr(env.unwrapped, "initial_state_distrib")
+    found = _from_table(env, most) if own else _enumerated(env, tuple(seeds), most)
     return _tabulation(found, mapped, tuple(orientation), int(env.action_space.n))
 
 
@@ -155,16 +169,56 @@ class _Graph:
     initial: NDArray[np.float64]
 
 
-def _from_table(env: gymnasium.Env[Any, Any]) -> _Graph:
-    table: Any = env.unwrapped
-    states = range(len(table.P))
-    outcomes = [[list(_merged(table.P[s][a])) for a in range(len(table.P[s]))] for s in states]
-    terminal = [False] * len(states)
-    for rows in table.P.values():
-        for row in rows.values():
-            for _, following, _, over in row:
-                terminal[following] |= bool(over)
-    return _Graph(list(states), outcomes, terminal, np.asarray(table.initial_state_distrib, dtype=np.float64))
+def _from_table(env: gymnasium.Env[Any, Any], most: int) -> _Graph:
+    below: Any = env
+    while isinstance(below, gymnasium.Wrapper):
+        if not isinstance(below, _WATCHING):
+            raise ConfigurationError(
+                f"the table of {env.unwrapped} knows nothing of {type(below).__name__}; tabulate what is below it"
+            )
+        below = below.env
+    states = range(len(below.P))
+    if len(states) > most:
+        raise DataError(_too_many(most))
+    outcomes = [[list(_merged(below.P[s][a])) for a in range(len(below.P[s]))] for s in states]
+    initial = np.asarray(below.initial_state_distrib, dtype=np.float64)
+    return _Graph(list(states), outcomes, _table_ends(below.P, initial), initial)
+
+
+def _table_ends(table: Any, initial: NDArray[np.float64]) -> list[bool]:
+    """In which states an episode ends; in what cannot be reached it does not."""
+    ends: dict[int, bool] = {}
+    waiting = [int(state) for state in np.flatnonzero(initial)]
+    seen = set(waiting)
+    while waiting:
+        state = waiting.pop()
+        for action in range(len(table[state])):
+            for probability, following, _, over in table[state][action]:
+                if probability <= 0:
+                    continue
+                if ends.setdefault(int(following), bool(over)) != bool(over):
+                    raise DataError(_ambiguous(following))
+                if not over and following not in seen:
+                    seen.add(int(following))
+                    waiting.append(int(following))
+    return [ends.get(state, False) for state in range(len(table))]
+
+
+def _too_many(most: int) -> str:
+    return f"the environment has more than {most} states; raise most, or learn over steps instead"
+
+
+def _ambiguous(observation: Any) -> str:
+    return (
+        f"an episode ends in {_short(observation)} on one way and goes on on another; let the observation tell the "
+        "whole state, with gymnasium.wrappers.TransformObservation"
+    )
+
+
+def _short(observation: Any) -> str:
+    """An observation in one line."""
+    text = " ".join(repr(observation).split())
+    return text if len(text) <= 80 else f"{text[:80]}…"
 
 
 def _merged(row: Iterable[tuple[float, int, float, bool]]) -> Iterable[Outcome]:
@@ -176,55 +230,99 @@ def _merged(row: Iterable[tuple[float, int, float, bool]]) -> Iterable[Outcome]:
     return [(weight, following, reward) for (following, reward), weight in weights.items() if weight > 0]
 
 
-def _enumerated(env: gymnasium.Env[Any, Any], seeds: tuple[int, ...], most: int) -> _Graph:
-    graph = _Graph([], [], [], np.zeros(0))
-    numbers: dict[Hashable, int] = {}
-    waiting: deque[tuple[int, gymnasium.Env[Any, Any]]] = deque()
+class _Search:
+    """Tries every action from every state, breadth first, each in a copy of the environment."""
 
-    def number(observation: Any, over: bool, world: Callable[[], gymnasium.Env[Any, Any]]) -> int:
+    def __init__(self, actions: int, most: int) -> None:
+        self.graph = _Graph([], [], [], np.zeros(0))
+        self.waiting: deque[tuple[int, gymnasium.Env[Any, Any]]] = deque()
+        self.numbers: dict[Hashable, int] = {}
+        self._second: dict[int, gymnasium.Env[Any, Any]] = {}
+        self._compared: set[int] = set()
+        self._actions, self._most = actions, most
+
+    def number(self, observation: Any, over: bool, world: gymnasium.Env[Any, Any], origin: int = -1) -> int:
+        """The number of a state that was reached; the world there is kept if it is new, or reached a second time."""
         key = _key(observation)
-        if key not in numbers:
-            if len(numbers) == most:
-                raise DataError(f"the environment has more than {most} states; raise most, or learn over steps instead")
-            numbers[key] = len(numbers)
-            graph.observations.append(observation)
-            graph.outcomes.append([])
-            graph.terminal.append(over)
-            waiting.append((numbers[key], world()))
-        return numbers[key]
+        found = self.numbers.get(key)
+        if found is None:
+            if len(self.numbers) == self._most:
+                raise DataError(_too_many(self._most))
+            found = self.numbers[key] = len(self.numbers)
+            self.graph.observations.append(observation)
+            self.graph.outcomes.append([])
+            self.graph.terminal.append(over)
+            self.waiting.append((found, world))
+        elif self.graph.terminal[found] != over:
+            raise DataError(_ambiguous(observation))
+        elif not over and origin != found and found not in self._compared:
+            self._compared.add(found)
+            if self.graph.outcomes[found]:
+                self._compare(found, world)
+            else:
+                self._second[found] = world
+        return found
 
+    def expand(self, state: int, world: gymnasium.Env[Any, Any]) -> None:
+        """Try every action in a state."""
+        if self.graph.terminal[state]:  # nothing comes after it, so it stays where it is
+            self.graph.outcomes[state] = [[(1.0, state, 0.0)] for _ in range(self._actions)]
+            return
+        rows: list[list[Outcome]] = []
+        for action in range(self._actions):
+            after = _copied(world)
+            following, reward, over, _, _ = after.step(action)
+            _check_certain(world, action, (_key(following), float(reward), bool(over)))
+            rows.append([(1.0, self.number(following, bool(over), after, state), float(reward))])
+        self.graph.outcomes[state] = rows
+        if state in self._second:
+            self._compare(state, self._second.pop(state))
+
+    def _compare(self, state: int, world: gymnasium.Env[Any, Any]) -> None:
+        """Check that a state goes on from a second way to it as it does from the first."""
+        for action in range(self._actions):
+            following = _copied(world).step(action)[0]
+            if self.numbers.get(_key(following)) != self.graph.outcomes[state][action][0][1]:
+                raise DataError(
+                    f"action {action} in {_short(self.graph.observations[state])} leads on by how it was reached; let "
+                    "the observation tell the whole state, or learn over steps with tickwise.rl.stepping instead"
+                )
+
+
+def _enumerated(env: gymnasium.Env[Any, Any], seeds: tuple[int, ...], most: int) -> _Graph:
+    if not seeds:
+        raise ConfigurationError("there is no seed; give at least one, from whose reset states can be found")
+    search = _Search(int(env.action_space.n), most)  # type: ignore[attr-defined]
     starts = []
     for seed in seeds:
         observation, _ = env.reset(seed=int(seed))
-        starts.append(number(observation, False, lambda: copy.deepcopy(env)))
-    while waiting:
-        state, world = waiting.popleft()
-        for action in range(int(env.action_space.n)):  # type: ignore[attr-defined]
-            if graph.terminal[state]:  # nothing comes after it, so it stays where it is
-                graph.outcomes[state].append([(1.0, state, 0.0)])
-                continue
-            after = copy.deepcopy(world)
-            following, reward, over, _, _ = after.step(action)
-            _check_certain(world, action, following)
-            arrived = number(following, over, lambda after=after: after)  # type: ignore[misc]
-            if graph.terminal[arrived] != over:
-                raise DataError(
-                    f"an episode ends in {following!r} on one way and goes on on another; "
-                    "let the observation tell the whole state, with gymnasium.wrappers.TransformObservation"
-                )
-            graph.outcomes[state].append([(1.0, arrived, float(reward))])
-    initial = np.bincount(starts, minlength=len(numbers)) / len(starts)
+        starts.append(search.number(observation, False, _copied(env)))
+    while search.waiting:
+        search.expand(*search.waiting.popleft())
+    graph = search.graph
+    initial = np.bincount(starts, minlength=len(graph.observations)) / len(starts)
     return _Graph(graph.observations, graph.outcomes, graph.terminal, initial)
 
 
-def _check_certain(world: gymnasium.Env[Any, Any], action: int, following: Any) -> None:
+def _copied(env: gymnasium.Env[Any, Any]) -> gymnasium.Env[Any, Any]:
+    try:
+        return copy.deepcopy(env)
+    except (TypeError, NotImplementedError, RecursionError) as error:
+        raise DataError(
+            f"{env} cannot be copied ({error}), so that its states cannot be tried; learn over steps with "
+            "tickwise.rl.stepping instead"
+        ) from None
+
+
+def _check_certain(world: gymnasium.Env[Any, Any], action: int, expected: tuple[Hashable, float, bool]) -> None:
     for trial in range(_TRIALS):
-        again = copy.deepcopy(world)
+        again = _copied(world)
         again.unwrapped.np_random = np.random.default_rng(trial)
-        if _key(again.step(action)[0]) != _key(following):
+        observation, reward, over, _, _ = again.step(action)
+        if (_key(observation), float(reward), bool(over)) != expected:
             raise DataError(
-                f"action {action} leads to different observations by chance, so that its probabilities cannot be "
-                "found by trying; learn over steps with tickwise.rl.stepping instead"
+                f"action {action} leads to different observations, rewards or ends by chance, so that its "
+                "probabilities cannot be found by trying; learn over steps with tickwise.rl.stepping instead"
             )
 
 
