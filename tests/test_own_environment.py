@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import io
 import re
 from pathlib import Path
@@ -14,12 +15,14 @@ BLOCK = re.compile(r"^```python\n(.*?)^```\n(?:\n```text\n(.*?)^```)?", flags=re
 
 
 def test_every_block_runs_and_prints_what_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    pytest.importorskip("stable_baselines3")
+    deep = importlib.util.find_spec("stable_baselines3") is not None  # it is optional
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
     blocks = BLOCK.findall(PAGE.read_text(encoding="utf-8"))
     assert len(blocks) >= 10
     for source, shown in blocks:
+        if "stable_baselines3" in source and not deep:
+            continue
         with contextlib.redirect_stdout(io.StringIO()) as printed:
             exec(source, names)
         assert printed.getvalue() == shown, source

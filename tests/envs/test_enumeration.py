@@ -220,7 +220,7 @@ def test_the_optimum_of_an_environments_own_rewards_is_the_known_one():
 
 
 def test_a_reward_that_depends_on_more_than_where_one_arrives_is_no_task():
-    with pytest.raises(DataError, match="depends on how it is reached; learn over steps with tickwise.rl.stepping"):
+    with pytest.raises(DataError, match=r"depends on how it is reached; learn over steps with tickwise.rl.stepping"):
         tabulate(gymnasium.make("Taxi-v4"), TAXI).own_task(20)
 
 
