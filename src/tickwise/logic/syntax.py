@@ -86,6 +86,12 @@ class Formula:
 
         return semantics.robustness(self, X, variables=variables, lengths=lengths)
 
+    def to(self, dialect: str, *, period: float = 1.0) -> str:
+        """The formula for another tool, such as ``rtamt``; see `tickwise.logic.dialects.translate`."""
+        from tickwise.logic.dialects import translate
+
+        return translate(self, dialect, period=period)
+
 
 @dataclass(frozen=True, slots=True)
 class Interval:
