@@ -1,13 +1,12 @@
-"""Timed automata as text for other programs, one function a format; back from JSON; where to draw what."""
+"""Timed automata as Graphviz, Mermaid and JSON, and back from JSON; where to draw what."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
 from tickwise.automata.model import ClockConstraint, Edge, TimedAutomaton, condition
-from tickwise.errors import AutomatonError, ConfigurationError, FormulaError
+from tickwise.errors import AutomatonError, FormulaError
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import to_sdnf
 from tickwise.logic.syntax import Box, Not, Predicate
@@ -22,25 +21,6 @@ JSON_FORMAT: Final = "tickwise timed automaton"
 JSON_VERSION: Final = 1
 
 Kind = TypeVar("Kind")
-
-
-def export(automaton: TimedAutomaton, format: str) -> str:
-    """An automaton as text.
-
-    Args:
-        automaton: The timed automaton.
-        format: ``dot`` (Graphviz), ``json`` or ``mermaid``.
-
-    Returns:
-        The text, which ends with a newline.
-
-    Raises:
-        ConfigurationError: If there is no such format.
-    """
-    exporter = EXPORTERS.get(format)
-    if exporter is None:
-        raise ConfigurationError(f"format {format!r} is unknown; use one of {', '.join(sorted(EXPORTERS))}")
-    return exporter(automaton)
 
 
 def layout(automaton: TimedAutomaton) -> tuple[tuple[float, float], ...]:
@@ -161,13 +141,6 @@ def to_json(automaton: TimedAutomaton) -> str:
         ],
     }
     return json.dumps(document, indent=1, ensure_ascii=False) + "\n"
-
-
-EXPORTERS: Final[dict[str, Callable[[TimedAutomaton], str]]] = {
-    "dot": to_dot,
-    "json": to_json,
-    "mermaid": to_mermaid,
-}
 
 
 def from_json(text: str) -> TimedAutomaton:

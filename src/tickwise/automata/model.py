@@ -215,10 +215,10 @@ class TimedAutomaton:
         return compile_table(self, horizon, reduce=reduce)
 
     def to(self, format: str) -> str:
-        """The automaton as text in a format of `tickwise.automata.interchange`, for instance ``dot``."""
-        from tickwise.automata.interchange import export
+        """The automaton as text in a format of `tickwise.automata.formats`, for instance ``dot``."""
+        from tickwise.automata.formats import export
 
-        return export(self, format)
+        return export((self,), format)
 
     def __str__(self) -> str:
         names = (f"ρ{index + 1} = {predicate}" for index, predicate in enumerate(self.predicates))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,27 +14,31 @@ from tickwise.errors import ConfigurationError
 @command
 def automaton(
     formula: Annotated[str, typer.Argument(help="A formula in sequential disjunctive normal form.")],
-    format: Annotated[str, typer.Option(help="dot, json, mermaid or svg.")] = "dot",
+    format: Annotated[str, typer.Option(help="dot, json, mermaid, svg, tchecker or uppaal.")] = "dot",
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write to this file instead of printing.")
+    ] = None,
 ) -> None:
-    """Print the timed automaton of each sequential conjunctive subformula.
+    """Print or write the timed automaton of each sequential conjunctive subformula.
 
-    For example: tickwise automaton 'F[1,15] G[0,4] (x >= 3)' --format mermaid
+    For example: tickwise automaton 'F[1,15] G[0,4] (x >= 3)' --format uppaal -o reach.xml
     """
+    from tickwise._files import write_bytes
     from tickwise.automata.build import timed_automata
-    from tickwise.automata.interchange import EXPORTERS
+    from tickwise.automata.formats import FORMATS, export
     from tickwise.logic.parse import parse
 
-    formats = (*EXPORTERS, "svg")
+    formats = tuple(sorted((*FORMATS, "svg")))
     if format not in formats:
         raise ConfigurationError(f"there is no format {format!r}; use one of {', '.join(formats)}")
     automata = timed_automata(parse(formula))
     if format == "svg":
         from tickwise.experiments.figures import draw_automata
 
-        print(draw_automata(automata), end="")
-        return
-    texts = [each.to(format) for each in automata]
-    if format == "json":
-        print(json.dumps([json.loads(text) for text in texts], indent=1, ensure_ascii=False))
+        text = draw_automata(automata)
     else:
-        print("\n".join(texts), end="")
+        text = export(automata, format)
+    if output is None:
+        print(text, end="")
+    else:
+        write_bytes(output, text.encode())

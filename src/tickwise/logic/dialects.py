@@ -3,7 +3,7 @@
 Every tool has conventions of its own for intervals and for what lies beyond the end of a trace. The text says
 the same as our formula, in verdict and (but for MoonLight) in robustness, on every trace that reaches the
 formula's horizon `Formula.end_effect`. On shorter ones the tools differ; rtamt and py-metric-temporal-logic agree
-with our verdict wherever it is not UNKNOWN, since they suppose one of the continuations:
+with our verdict wherever it is not UNKNOWN, since they only fill in what is unknown:
 
 - **rtamt** (discrete time, closed intervals) cuts a window at the trace's end: of an empty window `always` is
   inf and `eventually` -inf.
@@ -14,7 +14,7 @@ with our verdict wherever it is not UNKNOWN, since they suppose one of the conti
   is the trace's last it answers for that tick. Give it whole traces. Its verdicts (domain boolean) are ours;
   its robustness (domain minmax) is not always: version 0.3.1 notices some changes within a window too late.
 - **Breach** (dense time, closed intervals) holds the last value, and puts values between two ticks on a
-  straight line, which may cross a region that no tick is in. Its monitor is read here, not run.
+  straight line, which may cross a region that no tick is in. This is read from its source: it needs MATLAB.
 """
 
 from __future__ import annotations
