@@ -21,26 +21,47 @@ TOGETHER: Final[dict[str, Callable[[Sequence[TimedAutomaton]], str]]] = {"tcheck
 FORMATS: Final = tuple(sorted((*ALONE, *TOGETHER)))
 
 
-def export(automata: Sequence[TimedAutomaton], format: str) -> str:
-    """Automata as one text.
+def export(automaton: TimedAutomaton, format: str) -> str:
+    """One automaton as text.
 
     Args:
-        automata: One automaton or more, such as those of one formula's disjuncts.
+        automaton: The timed automaton.
         format: ``dot`` (Graphviz), ``json``, ``mermaid``, ``tchecker`` or ``uppaal``.
 
     Returns:
-        The text, which ends with a newline. Several automata are one system in TChecker and UPPAAL, a list in
-        JSON, and one diagram after the other in Graphviz and Mermaid.
+        The text, which ends with a newline.
 
     Raises:
         ConfigurationError: If there is no such format.
         AutomatonError: If the letters are too many for a system; see `tickwise.automata.network.network`.
     """
+    _require(format)
+    return TOGETHER[format]((automaton,)) if format in TOGETHER else ALONE[format](automaton)
+
+
+def export_all(automata: Sequence[TimedAutomaton], format: str) -> str:
+    """The automata of a formula's disjuncts as one text.
+
+    Args:
+        automata: The automata.
+        format: As for `export`.
+
+    Returns:
+        One system in TChecker and UPPAAL, a list in JSON, one diagram after the other in Graphviz and Mermaid.
+
+    Raises:
+        ConfigurationError: If there is no such format.
+        AutomatonError: If the letters are too many for a system, or there is no automaton for one.
+    """
+    _require(format)
     if format in TOGETHER:
         return TOGETHER[format](automata)
-    if format not in ALONE:
-        raise ConfigurationError(f"format {format!r} is unknown; use one of {', '.join(FORMATS)}")
     texts = [ALONE[format](automaton) for automaton in automata]
-    if format == "json" and len(texts) > 1:
+    if format == "json":
         return json.dumps([json.loads(text) for text in texts], indent=1, ensure_ascii=False) + "\n"
     return "\n".join(texts)
+
+
+def _require(format: str) -> None:
+    if format not in FORMATS:
+        raise ConfigurationError(f"format {format!r} is unknown; use one of {', '.join(FORMATS)}")

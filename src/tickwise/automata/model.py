@@ -218,7 +218,7 @@ class TimedAutomaton:
         """The automaton as text in a format of `tickwise.automata.formats`, for instance ``dot``."""
         from tickwise.automata.formats import export
 
-        return export((self,), format)
+        return export(self, format)
 
     def __str__(self) -> str:
         names = (f"ρ{index + 1} = {predicate}" for index, predicate in enumerate(self.predicates))

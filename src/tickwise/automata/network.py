@@ -135,9 +135,9 @@ def _possible_letters(regions: Sequence[Box]) -> tuple[tuple[bool, ...], ...]:
     for region in regions:
         split: dict[tuple[bool, ...], list[Box | None]] = {}
         for letter, pieces in cells.items():
-            inside = [both for piece in pieces if (both := _meet(piece, region)) is not None]
+            inside: list[Box | None] = [both for piece in pieces if (both := _meet(piece, region)) is not None]
             outside = [part for piece in pieces for part in _without(piece, region)]
-            split |= {(*letter, holds): part for holds, part in ((False, outside), (True, inside)) if part}
+            split |= {(*letter, holds): parts for holds, parts in ((False, outside), (True, inside)) if parts}
         cells = split
         if len(cells) > MOST_LETTERS:
             raise AutomatonError(

@@ -25,7 +25,7 @@ def automaton(
     """
     from tickwise._files import write_bytes
     from tickwise.automata.build import timed_automata
-    from tickwise.automata.formats import FORMATS, export
+    from tickwise.automata.formats import FORMATS, export_all
     from tickwise.logic.parse import parse
 
     formats = tuple(sorted((*FORMATS, "svg")))
@@ -37,7 +37,7 @@ def automaton(
 
         text = draw_automata(automata)
     else:
-        text = export(automata, format)
+        text = export_all(automata, format)
     if output is None:
         print(text, end="")
     else:
