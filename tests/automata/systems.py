@@ -9,8 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from itertools import product
+from types import CodeType
 from xml.etree import ElementTree
 
 
@@ -80,7 +81,7 @@ class Simulation:
         return self.evaluate(process.invariants.get(place, "True"))
 
     def evaluate(self, expression: str) -> bool:
-        return bool(eval(expression, {"__builtins__": {}}, {**self.values, **self.clocks}))
+        return bool(eval(compiled(expression), {"__builtins__": {}}, {**self.values, **self.clocks}))
 
     def letter(self, joint: Joint) -> Letter | None:
         updates = [update for _, step in joint for update in step.updates if re.match(r"p\d", update)]
@@ -92,22 +93,25 @@ class Simulation:
     def joints(self) -> Iterator[Joint]:
         busy = [(name, event) for handshake in self.system.handshakes for name, event in handshake]
         for process in self.system.processes:
-            for step in process.steps:
+            for step in self.leaving(process):
                 if (process.name, step.event) not in busy:
                     yield ((process, step),)
         by_name = {process.name: process for process in self.system.processes}
         for handshake in self.system.handshakes:
             options = [
-                [(by_name[name], step) for step in by_name[name].steps if step.event == event]
+                [(by_name[name], step) for step in self.leaving(by_name[name]) if step.event == event]
                 for name, event in handshake
             ]
             yield from product(*options)
+
+    def leaving(self, process: Process) -> list[Step]:
+        return [step for step in process.steps if step.source == self.places[process.name]]
 
     def enabled(self, joint: Joint) -> bool:
         committed = {p.name for p in self.system.processes if self.places[p.name] in p.committed}
         if committed and not committed & {process.name for process, _ in joint}:
             return False
-        return all(self.places[process.name] == step.source and self.evaluate(step.guard) for process, step in joint)
+        return all(self.evaluate(step.guard) for _, step in joint)
 
     def take(self, joint: Joint) -> None:
         for process, step in joint:
@@ -118,6 +122,11 @@ class Simulation:
                 target[name] = int(self.evaluate(value)) if target is self.clocks else self.evaluate(value)
             self.places[process.name] = step.target
         assert all(self.holds(p, self.places[p.name]) for p in self.system.processes)
+
+
+@cache
+def compiled(expression: str) -> CodeType:
+    return compile(expression.strip(), "<system>", "eval")
 
 
 def python(expression: str) -> str:
@@ -169,16 +178,10 @@ def uppaal_process(template: ElementTree.Element, values: dict[str, object]) -> 
     for edge in template.iter("transition"):
         labels = {label.get("kind"): label.text for label in edge.findall("label")}
         updates = list(filter(None, labels.get("assignment", "").split(", ")))
-        for choice in uppaal_choices(labels.get("select"), values):
-            steps.append(
-                Step(
-                    names[edge.find("source").get("ref")],
-                    names[edge.find("target").get("ref")],
-                    labels.get("synchronisation", ""),
-                    python(labels.get("guard", "")),
-                    [choice(update) for update in updates],
-                )
-            )
+        source, target = (names[edge.find(end).get("ref")] for end in ("source", "target"))
+        event, guard = labels.get("synchronisation", ""), python(labels.get("guard", ""))
+        choices = uppaal_choices(labels.get("select"), values)
+        steps += [Step(source, target, event, guard, list(map(choice, updates))) for choice in choices]
     declared = template.findtext("declaration")
     return Process(
         template.findtext("name"),

@@ -37,7 +37,8 @@ pytestmark = pytest.mark.skipif(not loads(), reason="tcheckerpy is not installed
 def reachable(text: str, *labels: str) -> bool:
     from tcheckerpy.tools import tck_reach
 
-    return tck_reach.reach(text, tck_reach.Algorithm.COVREACH, labels=list(labels))[0]
+    # given a list, it would look for labels that begin with a space
+    return tck_reach.reach(text, tck_reach.Algorithm.COVREACH, labels=[",".join(labels)])[0]
 
 
 def playing(text: str, letters: list[tuple[bool, ...]]) -> str:
