@@ -6,6 +6,7 @@ import shutil
 import subprocess
 from contextlib import suppress
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import pytest
 from hypothesis import given, settings
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from tests.automata.twins import CASE_STUDY, G, one
 from tests.strategies import sequential_conjunctions
 from tickwise.automata.build import build
-from tickwise.automata.interchange import fill, from_json, layout, to_dot, to_json, to_mermaid
+from tickwise.automata.interchange import fill, from_json, label, layout, to_dot, to_json, to_mermaid
 from tickwise.errors import AutomatonError
 
 AUTOMATON = build(CASE_STUDY)
@@ -29,14 +30,13 @@ def test_dot_by_hand():
         "  rankdir=LR;",
         f'  label="{text}";',
         '  node [shape=circle, style=filled, fontname="Helvetica"];',
-        '  edge [fontname="Helvetica"];',
+        '  edge [fontname="Helvetica", fontsize=11];',
         "  start [shape=point];",
         '  n0 [label="q0", shape=circle, fillcolor="#E69F00"];',
         '  n1 [label="acc", shape=doublecircle, fillcolor="#FFFFFF"];',
         '  n2 [label="rej1", shape=circle, fillcolor="#BBBBBB"];',
         "  start -> n0;",
-        '  n0 -> n0 [label="¬ρ1, c1 < 2"];',
-        '  n0 -> n0 [label="ρ1, c1 < 1"];',
+        '  n0 -> n0 [label="¬ρ1, c1 < 2\\nρ1, c1 < 1"];',
         '  n0 -> n1 [label="ρ1, c1 >= 1, c1 <= 2"];',
         '  n0 -> n2 [label="¬ρ1, c1 >= 2"];',
         '  n1 -> n1 [label="any letter"];',
@@ -77,6 +77,7 @@ def test_mermaid_by_hand():
         "  start --> n0",
     ]
     assert '  n0 -->|"ρ1, c1 #62;= 1, c1 #60;= 2"| n1' in lines
+    assert '  n0 -->|"¬ρ1, c1 #60; 2<br>ρ1, c1 #60; 1"| n0' in lines
     assert "  style n1 fill:#FFFFFF,stroke:#000000,color:#000000" in lines
     assert sum(line.startswith("  legend") for line in lines) == 1
 
@@ -189,7 +190,12 @@ def test_a_document_with_anything_in_it_is_read_or_refused(data):
 def test_both_drawings_have_every_location_and_edge(conjunction):
     automaton = build(conjunction)
     dot, mermaid = to_dot(automaton), to_mermaid(automaton)
-    assert dot.count(" -> ") == mermaid.count(" -->") == len(automaton.edges) + 1
+    drawn = {(edge.source, edge.target) for edge in automaton.edges}
+    assert dot.count(" -> ") == mermaid.count(" -->") == len(drawn) + 1
+    for edge in automaton.edges:
+        assert re.search(
+            rf'n{edge.source} -> n{edge.target} \[label="(.*\\n)?{label(automaton, edge)}(\\n.*)?"\];', dot
+        )
     for name in automaton.locations:
         assert f'label="{name}"' in dot
         assert f'("{name}")' in mermaid
@@ -220,3 +226,17 @@ def test_black_text_is_readable_on_every_fill():
         contrast = (_luminance(fill(AUTOMATON, location)) + 0.05) / 0.05
         assert contrast > 4.5
     assert fill(AUTOMATON, 0) == fill(AUTOMATON, 1) != fill(AUTOMATON, 2)
+
+
+@pytest.mark.skipif(shutil.which("dot") is None, reason="Graphviz's dot is not installed")
+@pytest.mark.parametrize("automaton", [AUTOMATON, HOSTILE])
+def test_graphviz_draws_the_dot(automaton):
+    done = subprocess.run(
+        ["dot", "-Tsvg"], input=to_dot(automaton), capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stderr == ""
+    texts = [element.text for element in ElementTree.fromstring(done.stdout).iter("{http://www.w3.org/2000/svg}text")]
+    lines = [line.strip() for name in automaton.locations for line in name.splitlines()]
+    assert set(lines) <= {text.strip() for text in texts}
+    for edge in automaton.edges:
+        assert label(automaton, edge) in texts

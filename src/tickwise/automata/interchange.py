@@ -61,6 +61,14 @@ def label(automaton: TimedAutomaton, edge: Edge) -> str:
     return condition(automaton, edge) + (f" / {resets}" if resets else "")
 
 
+def arrows(automaton: TimedAutomaton) -> dict[tuple[int, int], list[str]]:
+    """The labels of all edges from one location to another, which are drawn as one arrow with a line for each."""
+    found: dict[tuple[int, int], list[str]] = {}
+    for edge in automaton.edges:
+        found.setdefault((edge.source, edge.target), []).append(label(automaton, edge))
+    return found
+
+
 def legend(automaton: TimedAutomaton) -> tuple[str, ...]:
     """The predicates, one line each, for instance ``ρ1: x >= 3``."""
     return tuple(f"ρ{index + 1}: {predicate}" for index, predicate in enumerate(automaton.predicates))
@@ -73,7 +81,7 @@ def to_dot(automaton: TimedAutomaton) -> str:
         "  rankdir=LR;",
         f"  label={_dot_text(str(automaton.conjunction))};",
         '  node [shape=circle, style=filled, fontname="Helvetica"];',
-        '  edge [fontname="Helvetica"];',
+        '  edge [fontname="Helvetica", fontsize=11];',
         "  start [shape=point];",
     ]
     for location, name in enumerate(automaton.locations):
@@ -81,9 +89,8 @@ def to_dot(automaton: TimedAutomaton) -> str:
         colour = fill(automaton, location)
         lines.append(f'  n{location} [label={_dot_text(name)}, shape={shape}, fillcolor="{colour}"];')
     lines.append(f"  start -> n{automaton.initial};")
-    lines += [
-        f"  n{edge.source} -> n{edge.target} [label={_dot_text(label(automaton, edge))}];" for edge in automaton.edges
-    ]
+    for (source, target), labels in arrows(automaton).items():
+        lines.append(f"  n{source} -> n{target} [label={_dot_text(chr(10).join(labels))}];")
     # "\l" ends a line and aligns it to the left
     rows = "".join(_dot_text(row)[1:-1] + "\\l" for row in legend(automaton))
     lines += [f'  legend [shape=note, fillcolor="#FFFFFF", label="{rows}"];', "}"]
@@ -97,9 +104,9 @@ def to_mermaid(automaton: TimedAutomaton) -> str:
         opening, closing = ("(((", ")))") if location in automaton.accepting else ("((", "))")
         lines.append(f"  n{location}{opening}{_mermaid_text(name)}{closing}")
     lines.append(f"  start --> n{automaton.initial}")
-    lines += [
-        f"  n{edge.source} -->|{_mermaid_text(label(automaton, edge))}| n{edge.target}" for edge in automaton.edges
-    ]
+    for (source, target), labels in arrows(automaton).items():
+        text = "<br>".join(_mermaid_text(each)[1:-1] for each in labels)
+        lines.append(f'  n{source} -->|"{text}"| n{target}')
     rows = "<br>".join(_mermaid_text(row)[1:-1] for row in legend(automaton))
     lines.append(f'  legend["{rows}"]')
     lines += [
