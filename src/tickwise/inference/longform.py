@@ -19,7 +19,7 @@ FIXED = ("trajectory", "tick", "label")
 class LongTable:
     """Gathers the rows of a long table; knows where each came from, for the messages."""
 
-    def __init__(self, file: Path, header: Sequence[str], labelled: bool) -> None:
+    def __init__(self, file: Path | str, header: Sequence[str], labelled: bool) -> None:
         self.file = file
         self.header = list(header)
         needed = FIXED if labelled or "label" in header else FIXED[:2]

@@ -101,6 +101,27 @@ class LabelledTrajectories:
         return cls(values, np.asarray(counts), np.asarray(y), names, labels)
 
     @classmethod
+    def from_frame(cls, frame: Any) -> LabelledTrajectories:
+        """Build from a data frame in long form, one row a tick, as a CSV file has it.
+
+        Args:
+            frame: Has the columns ``trajectory, tick, <variables…>, label``: ticks 0, 1, 2, … in each trajectory, and
+                one label, 1 or -1, a trajectory.
+
+        Returns:
+            The trajectories, in the order of their first rows.
+
+        Raises:
+            DataError: If the frame is not of this form; the message names the row.
+        """
+        from tickwise.inference.frames import split_frame
+
+        data, labels = split_frame(frame)
+        if labels is None:
+            raise DataError("the data frame has no column 'label'; add one of 1 and -1")
+        return cls(data.values, data.lengths, labels, data.variables, data.ids)
+
+    @classmethod
     def joined(cls, parts: Iterable[LabelledTrajectories]) -> LabelledTrajectories:
         """All trajectories of parts with the same variables, one part after the other.
 
