@@ -3,46 +3,89 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
 from tickwise.cli.app import COLUMNS, JsonFlag, command, output, print_json
+from tickwise.cli.evidence import page_path, show_explanation, write_page
+from tickwise.errors import DataError
+
+if TYPE_CHECKING:
+    from tickwise.inference.trajectories import LabelledTrajectories
+    from tickwise.logic.syntax import Formula
+
+_SUMMARY = "Show how many of each label the formula and each of its primitives keep, not every trajectory."
+_PAGE = "Also write a page with what the formula separates and a drawing, as one HTML file."
 
 
 @command
 def check(
     formula: Annotated[str, typer.Argument(help="A formula, such as 'F[1,15] G[0,4] (x >= 3)'.")],
     data: Annotated[Path, typer.Argument(help=f"Trajectories, labels are not needed: {COLUMNS}.")],
+    summary: Annotated[bool, typer.Option("--summary", help=_SUMMARY)] = False,
+    page: Annotated[Path | None, typer.Option("--page", "--html", metavar="FILE.html", help=_PAGE)] = None,
     as_json: JsonFlag = False,
 ) -> None:
-    """Check a formula on every trajectory: verdict and robustness.
+    """Check a formula on every trajectory: verdict and robustness; with labels also what it separates.
 
-    For example: tickwise check 'G[0,26] (y >= 21)' logs.npz
+    For example: tickwise check 'G[0,26] (y >= 21)' logs.npz --summary
     """
+    from tickwise.inference.explanation import explain
+    from tickwise.logic.parse import parse
+
+    page = page_path(page)
+    phi = parse(formula)
+    known, labelled = _read(data)
+    if not labelled and (summary or page is not None):
+        raise DataError(f"{data} has no labels, which --{'summary' if summary else 'page'} is about; add them")
+    found = explain(phi, known) if labelled else None
+    if page is not None and found is not None:
+        from tickwise.inference.page import render_page
+
+        write_page(page, render_page(found, known, source=data.name), quiet=as_json)
+    if as_json:
+        keys = ("id", "verdict", "robustness")
+        rows = [dict(zip(keys, row, strict=True)) for row in _rows(phi, known)]
+        print_json({"trajectories": rows, **({} if found is None else found.document())})
+        return
+    if not summary:
+        _show(_rows(phi, known))
+    if found is not None and (summary or output.is_terminal):
+        show_explanation(found)
+
+
+def _read(data: Path) -> tuple[LabelledTrajectories, bool]:
+    """The trajectories, and whether they have labels."""
+    from tickwise.inference.reading import read_trajectories
+
+    try:
+        return read_trajectories(data), True
+    except DataError:  # where it is not for want of labels, this fails again
+        return read_trajectories(data, labelled=False), False
+
+
+def _rows(phi: Formula, known: LabelledTrajectories) -> list[tuple[str, str, float | None]]:
+    """Name, verdict and robustness of each trajectory; None where no number says how robust."""
     import numpy as np
 
-    from tickwise.inference.reading import read_trajectories
-    from tickwise.logic.parse import parse
     from tickwise.logic.syntax import Verdict
 
-    phi = parse(formula)
-    known = read_trajectories(data, labelled=False)
     verdicts = phi.verdict(known.values, variables=known.variables, lengths=known.lengths)
     robustness = phi.robustness(known.values, variables=known.variables, lengths=known.lengths)
-    rows = [
+    return [
         (name, Verdict(int(verdict)).name.lower(), float(value) if np.isfinite(value) else None)
         for name, verdict, value in zip(known.ids, np.atleast_1d(verdicts), np.atleast_1d(robustness), strict=True)
     ]
-    if as_json:
-        keys = ("id", "verdict", "robustness")
-        print_json({"trajectories": [dict(zip(keys, row, strict=True)) for row in rows]})
-    elif output.is_terminal:
+
+
+def _show(rows: list[tuple[str, str, float | None]]) -> None:
+    if output.is_terminal:
         table = Table("trajectory", "verdict", "robustness")
         for name, shown, value in rows:
             table.add_row(name, shown, "" if value is None else f"{value:.6g}")
         output.print(table)
-    else:
-        for name, shown, value in rows:
-            print(name, shown, "" if value is None else value, sep="\t")
+        return
+    for name, shown, value in rows:
+        print(name, shown, "" if value is None else value, sep="\t")

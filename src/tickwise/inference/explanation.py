@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, astuple, dataclass
 from functools import reduce
 from typing import Any
 
@@ -37,6 +38,11 @@ class Confusion:
         positive, kept = np.asarray(labels) == 1, np.asarray(predicted) == 1
         cells = (positive & kept, positive & ~kept, ~positive & kept, ~positive & ~kept)
         return cls(*(int(np.count_nonzero(cell)) for cell in cells))
+
+    @classmethod
+    def pooled(cls, parts: Iterable[Confusion]) -> Confusion:
+        """The sum of the counts of some parts."""
+        return cls(*map(sum, zip(*(astuple(part) for part in parts), strict=True)))
 
     @property
     def count(self) -> int:

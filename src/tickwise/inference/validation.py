@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from scipy.stats import binomtest
 from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.inference.classifier import MITLClassifier
-from tickwise.inference.explanation import Confusion
+from tickwise.inference.explanation import Confusion, Explanation, Mistake, explain
 from tickwise.inference.trajectories import LabelledTrajectories
 
 CONFIDENCE = 0.95
@@ -57,7 +57,8 @@ def stratified_folds(labels: NDArray[Any], folds: int, seed: int = 0) -> tuple[N
         rows = np.flatnonzero(labels == label)
         if len(rows) < folds:
             raise DataError(
-                f"label {label} has {len(rows)} trajectories for {folds} folds; use at most {len(rows)} folds"
+                f"label {label} has {len(rows)} trajector{'y' if len(rows) == 1 else 'ies'} for {folds} folds; "
+                "give one a fold of each label or more, or use fewer folds"
             )
         # dealing goes on where the last label ended, so that folds have the same size within one row
         place[rng.permutation(rows)] = (dealt + np.arange(len(rows))) % folds
@@ -97,18 +98,24 @@ class Trial:
     """A model that was fitted without some trajectories, and judged on these.
 
     Attributes:
-        formula: Its formula; None if it found none.
         rows: The rows that were held out.
-        predicted: What it predicts for them, 1 or -1, of the same shape.
-        wrong: How many of the predictions are wrong.
+        explanation: Its formula on them.
         seconds: How long fitting took.
     """
 
-    formula: str | None
     rows: NDArray[np.int64]
-    predicted: NDArray[np.int64]
-    wrong: int
+    explanation: Explanation
     seconds: float
+
+    @property
+    def formula(self) -> str | None:
+        """The formula as text; None if none was found."""
+        return None if self.explanation.formula is None else str(self.explanation.formula)
+
+    @property
+    def wrong(self) -> int:
+        """How many of the predictions are wrong."""
+        return self.explanation.confusion.wrong
 
     @property
     def error(self) -> float:
@@ -123,22 +130,17 @@ class Validation:
     Attributes:
         method: ``"holdout"`` or ``"folds"``.
         trials: One for a held-out share, one a fold for cross-validation.
-        labels: The labels of all trajectories.
-        ids: Their names.
         interrupted: Whether Ctrl-C left out the folds that were to come.
     """
 
     method: str
-    trials: Sequence[Trial]
-    labels: NDArray[np.int8] = field(repr=False)
-    ids: tuple[str, ...] = field(repr=False)
+    trials: tuple[Trial, ...]
     interrupted: bool = False
 
     @property
     def confusion(self) -> Confusion:
         """Labels against held-out predictions, those of all folds pooled."""
-        rows = np.concatenate([trial.rows for trial in self.trials])
-        return Confusion.of(self.labels[rows], np.concatenate([trial.predicted for trial in self.trials]))
+        return Confusion.pooled(trial.explanation.confusion for trial in self.trials)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -155,12 +157,10 @@ class Validation:
             "from, so it is approximate, and it is of formulas inferred like the one shown"
         ).replace("%", " %")
 
-    def mistakes(self) -> Iterator[tuple[str, int, int, int]]:
-        """Name, label, prediction and fold (from 1) of each trajectory that was predicted wrongly."""
+    def mistakes(self) -> Iterator[tuple[int, Mistake]]:
+        """The trajectories that were predicted wrongly, each with the number of its fold, from 1."""
         for number, trial in enumerate(self.trials, 1):
-            for row, predicted in zip(trial.rows.tolist(), trial.predicted.tolist(), strict=True):
-                if predicted != self.labels[row]:
-                    yield self.ids[row], int(self.labels[row]), predicted, number
+            yield from ((number, mistake) for mistake in trial.explanation.mistakes)
 
     def sentence(self) -> str:
         """The held-out error with its interval."""
@@ -185,9 +185,7 @@ class Validation:
                 }
                 for trial in self.trials
             ],
-            "misclassified": [
-                dict(zip(("id", "label", "predicted", "trial"), mistake, strict=True)) for mistake in self.mistakes()
-            ],
+            "misclassified": [{**mistake.document(), "trial": number} for number, mistake in self.mistakes()],
             "interrupted": self.interrupted,
         }  # fmt: skip
 
@@ -221,7 +219,7 @@ def hold_out(
         DataError: If there are too few trajectories, or fitting fails.
     """
     fitted, trial = _trial(model, data, stratified_holdout(data.labels, share, seed))
-    return fitted, Validation("holdout", (trial,), data.labels, data.ids, fitted.interrupted_)
+    return fitted, Validation("holdout", (trial,), fitted.interrupted_)
 
 
 def cross_validate(
@@ -263,7 +261,7 @@ def cross_validate(
             report(number, trial)
     if not trials:
         raise KeyboardInterrupt
-    return Validation("folds", tuple(trials), data.labels, data.ids, interrupted)
+    return Validation("folds", tuple(trials), interrupted)
 
 
 def _trial(model: MITLClassifier, data: LabelledTrajectories, rows: NDArray[np.int64]) -> tuple[MITLClassifier, Trial]:
@@ -275,7 +273,5 @@ def _trial(model: MITLClassifier, data: LabelledTrajectories, rows: NDArray[np.i
     began = time.monotonic()
     fitted.fit(states_of(known), known.labels)
     seconds = time.monotonic() - began
-    predicted = fitted.predict(states_of(held_out))
-    wrong = int(np.count_nonzero(predicted != held_out.labels))
-    text = None if fitted.formula_ is None else str(fitted.formula_)
-    return fitted, Trial(text, rows, predicted, wrong, seconds)
+    formula = None if fitted.formula_ is None else fitted.formula_.formula
+    return fitted, Trial(rows, explain(formula, held_out), seconds)
