@@ -5,6 +5,11 @@ anomalous (Kong, Jones and Belta, 2014). The folds are those of the data's own p
 nine folds and judged on the tenth.
 
     python examples/naval.py DATA/naval.npz
+
+The command line does the same on folds of its own, once the data have the form that it reads:
+
+    python examples/naval.py DATA/naval.npz --export vessels.npz
+    tickwise infer vessels.npz --search joint --size 3 --rate 1 --information-weight 0 --levels 16 --folds 10
 """
 
 from __future__ import annotations
@@ -17,6 +22,7 @@ import numpy as np
 
 import tickwise as tw
 from tickwise.inference.exact import ExactSettings
+from tickwise.inference.reading import write_npz
 
 FOLDS = 10
 
@@ -29,6 +35,12 @@ def folds(path: Path) -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
     parts = np.split(order, FOLDS)
     rests = [np.setdiff1d(order, part) for part in parts]
     return [(states[rest], labels[rest], states[part], labels[part]) for rest, part in zip(rests, parts, strict=True)]
+
+
+def vessels(path: Path) -> tw.LabelledTrajectories:
+    """All trajectories; label 1 is a normal vessel."""
+    with np.load(path) as file:
+        return tw.LabelledTrajectories.from_arrays(file["X"].transpose(0, 2, 1), file["y"], ("x", "y"))
 
 
 def model(threads: int) -> tw.MITLClassifier:
@@ -44,7 +56,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("data", type=Path, help="the file naval.npz")
     parser.add_argument("--threads", type=int, default=2, help="threads of each search")
+    parser.add_argument("--export", type=Path, metavar="OUT.npz", help="write the data for tickwise infer, no more")
     arguments = parser.parse_args()
+    if arguments.export:
+        write_npz(arguments.export, vessels(arguments.data))
+        return
     errors, seconds, sizes = [], [], []
     for number, (states, labels, other, truth) in enumerate(folds(arguments.data)):
         began = time.perf_counter()

@@ -44,7 +44,7 @@ def check(
     if page is not None and found is not None:
         from tickwise.inference.page import render_page
 
-        write_page(page, render_page(found, known, source=data.name), quiet=as_json)
+        write_page(page, render_page(found, known, source=data.name))
     if as_json:
         keys = ("id", "verdict", "robustness")
         rows = [dict(zip(keys, row, strict=True)) for row in _rows(phi, known)]
@@ -54,6 +54,8 @@ def check(
         _show(_rows(phi, known))
     if found is not None and (summary or output.is_terminal):
         show_explanation(found)
+    if page is not None and output.is_terminal:
+        output.print(f"page: {page}")
 
 
 def _read(data: Path) -> tuple[LabelledTrajectories, bool]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
@@ -36,3 +37,18 @@ def compare(
     output.print(f"target structurally transferable from source: {'yes' if transferable else 'no'}")
     for name, parts in structures.items():
         output.print(f"{name.replace('_', ' ')}: {' | '.join(' & '.join(part) for part in parts)}")
+    if not transferable:
+        output.print(f"why not: {_difference(*structures.values())}")
+
+
+def _difference(source: Sequence[Sequence[str]], target: Sequence[Sequence[str]]) -> str:
+    """Where the target is no copy of the source's structure, nor several of them."""
+    if len(target) % len(source):
+        return f"the target has {_count(len(target))}, the source {_count(len(source))}; use as many, or several times"
+    number, part = next((n, part) for n, part in enumerate(target) if part != source[n % len(source)])
+    wanted = " & ".join(source[number % len(source)])
+    return f"disjunct {number + 1} of the target is {' & '.join(part)}, where the source has {wanted}"
+
+
+def _count(disjuncts: int) -> str:
+    return f"{disjuncts} disjunct{'' if disjuncts == 1 else 's'}"

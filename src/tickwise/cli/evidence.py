@@ -101,10 +101,8 @@ def page_path(path: Path | None) -> Path | None:
     return path
 
 
-def write_page(path: Path, text: str, *, quiet: bool) -> None:
-    """Write a page, and say where it is."""
+def write_page(path: Path, text: str) -> None:
+    """Write a page, wholly or not at all."""
     from tickwise._files import write_bytes
 
     write_bytes(path, text.encode("utf-8"))
-    if not quiet:
-        output.print(f"page: {path}")

@@ -86,12 +86,14 @@ def infer(
         text = render_page(
             found, known, source=data.name, settings=settings, facts=facts, tree=model.tree_, judged=judged
         )
-        write_page(page, text, quiet=as_json)
+        write_page(page, text)
     if as_json:
         held_out = {} if judged is None else {"validation": judged.document()}
         print_json({**facts, "interrupted": interrupted, **found.document(), **held_out})
     else:
         _show(model, facts, found, judged)
+        if page is not None:
+            output.print(f"page: {page}")
     if interrupted:
         messages.print("interrupted: this is the best so far")
         raise typer.Exit(INTERRUPTED)

@@ -20,6 +20,10 @@ WIDTH, HEIGHT = 600, 290
 LEFT, RIGHT, TOP, BOTTOM = 50, 590, 8, 252
 """The size of a panel and where its axes end, in units of the drawing."""
 
+LONGEST_NAME = 16
+"""Letters of a trajectory's id that are shown."""
+
+_LETTER, _LINE = 8.0, 14.0  # room that a letter and a line of text take
 _HALF = 0.35  # how far a window reaches beyond its first and last tick, in ticks
 
 
@@ -31,13 +35,13 @@ class Line:
         name: Its id.
         label: Its label, 1 or -1.
         points: Its states as SVG has points.
-        end: Where its last state is.
+        place: Where its name has room, near its last state.
     """
 
     name: str
     label: int
     points: str
-    end: tuple[float, float]
+    place: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,7 @@ class Mark:
         width: Along time.
         height: Along values.
         rest: Where the outer window ends and only the inner one goes on, if the operator is nested.
+        place: Where its name has room, at its upper left corner.
     """
 
     name: str
@@ -61,6 +66,7 @@ class Mark:
     width: float
     height: float
     rest: float | None
+    place: tuple[float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +150,9 @@ def _panel(
     ]
     scale = _Scale.of(states, data.horizon, [bound for _, _, bound in bounds])
     order = rows[np.argsort(data.labels[rows], kind="stable")].tolist()
-    lines = tuple(_line(row, states[row, : data.lengths[row]], data, scale) for row in order)
-    marks = tuple(_mark(name, primitive, bound, scale) for name, primitive, bound in bounds)
+    names = _Names()
+    marks = tuple(_mark(name, primitive, bound, scale, names) for name, primitive, bound in bounds)
+    lines = tuple(_line(row, states[row, : data.lengths[row]], data, scale, names) for row in order)
     across = tuple(Tick(scale.x(tick), f"{tick:g}") for tick in _steps(0, scale.last, 8, whole=True))
     up = tuple(Tick(scale.y(value), f"{value:g}") for value in _steps(scale.low, scale.high, 6))
     return Panel(variable, lines, marks, across, up)
@@ -177,18 +184,44 @@ class _Scale:
         return round(BOTTOM - (BOTTOM - TOP) * share, 1)
 
 
-def _line(row: int, states: NDArray[np.float64], data: LabelledTrajectories, scale: _Scale) -> Line:
+class _Names:
+    """Finds room for names: each goes down, and at the bottom up, until it covers no other."""
+
+    def __init__(self) -> None:
+        self._taken: list[tuple[float, float, float]] = []
+
+    def place(self, x: float, y: float, width: float) -> tuple[float, float]:
+        """Room for a name of some width, as near as may be to where its left end should be."""
+        x = min(max(x, LEFT + 2), RIGHT - width)
+        downward = [y + step * _LINE for step in range(int((BOTTOM - TOP) / _LINE))]
+        upward = [y - step * _LINE for step in range(int((BOTTOM - TOP) / _LINE))]
+        inside = [place for place in (*downward, *upward) if TOP + 10 <= place <= BOTTOM - 3]
+        free = (place for place in inside if all(self._apart(x, place, width, other) for other in self._taken))
+        y = next(free, y)
+        self._taken.append((x, y, width))
+        return round(x, 1), round(y, 1)
+
+    @staticmethod
+    def _apart(x: float, y: float, width: float, other: tuple[float, float, float]) -> bool:
+        return abs(y - other[1]) >= _LINE or x >= other[0] + other[2] or other[0] >= x + width
+
+
+def _line(row: int, states: NDArray[np.float64], data: LabelledTrajectories, scale: _Scale, names: _Names) -> Line:
     places = [(scale.x(tick), scale.y(value)) for tick, value in enumerate(states.tolist())]
-    return Line(data.ids[row], int(data.labels[row]), " ".join(f"{x:g},{y:g}" for x, y in places), places[-1])
+    points = " ".join(f"{x:g},{y:g}" for x, y in places)
+    x, y = places[-1]
+    width = _LETTER * min(len(data.ids[row]), LONGEST_NAME)
+    return Line(data.ids[row], int(data.labels[row]), points, names.place(x - width, y - 5, width))
 
 
-def _mark(name: str, primitive: Primitive, bound: Bound, scale: _Scale) -> Mark:
+def _mark(name: str, primitive: Primitive, bound: Bound, scale: _Scale, names: _Names) -> Mark:
     first, last = scale.x(primitive.start - _HALF), scale.x(primitive.end + _HALF)
     top, bottom = scale.y(bound.upper), scale.y(bound.lower)
     rest = scale.x(primitive.window.end + _HALF) if primitive.operator.nested else None
     shown = f"{name} {primitive.operator.symbol}{'¬' if primitive.complemented else ''}"
     width, height = round(last - first, 1), round(bottom - top, 1)
-    return Mark(shown, primitive.complemented, first, top, width, height, rest)
+    place = names.place(first + 5, top + 15 if height > 18 else top - 4, _LETTER * len(shown))
+    return Mark(shown, primitive.complemented, first, top, width, height, rest, place)
 
 
 def _steps(low: float, high: float, most: int, *, whole: bool = False) -> list[float]:
