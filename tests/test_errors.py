@@ -15,6 +15,7 @@ BUILTINS = {
     "UnknownVariableError": ValueError,
     "ConfigurationError": ValueError,
     "MissingFileError": FileNotFoundError,
+    "FileAccessError": OSError,
     "StoreError": OSError,
     "NotTransferableError": RuntimeError,
     "MissingExtraError": ImportError,

@@ -36,6 +36,10 @@ class MissingFileError(TickwiseError, FileNotFoundError):
     """A file or a folder that was named does not exist."""
 
 
+class FileAccessError(TickwiseError, OSError):
+    """A file or a folder that was named is there, but cannot be read or written."""
+
+
 class StoreError(TickwiseError, OSError):
     """A run folder cannot be read or written, or belongs to another configuration."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any, Final, TypeVar
 
+from tickwise._wording import brief, listed, reason
 from tickwise.automata.model import ClockConstraint, Edge, TimedAutomaton, condition
 from tickwise.errors import AutomatonError, FormulaError
 from tickwise.logic.parse import parse
@@ -164,26 +165,29 @@ def from_json(text: str) -> TimedAutomaton:
     """
     try:
         document = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise AutomatonError(f"not a JSON document: {error}; write one with to_json") from None
-    if _field(document, "format", str) != JSON_FORMAT or _field(document, "version", int) != JSON_VERSION:
+    except (TypeError, ValueError, RecursionError) as error:
+        raise AutomatonError(f"not a JSON document: {reason(error)}; write one with to_json") from None
+    format, version = _field(document, "format", str), _field(document, "version", int)
+    if (format, version) != (JSON_FORMAT, JSON_VERSION):
         raise AutomatonError(
-            f"format {document['format']!r} version {document['version']} cannot be read; "
+            f"format {brief(format)} version {brief(version)} cannot be read; "
             f"give {JSON_FORMAT!r} version {JSON_VERSION}"
         )
     try:
         return _automaton(document)
+    except AutomatonError as error:  # names of locations and clocks may have any signs
+        raise AutomatonError(" ".join(str(error).splitlines())) from None
     except FormulaError as error:
-        raise AutomatonError(f"a formula in the JSON cannot be read: {str(error).splitlines()[0]}") from None
+        raise AutomatonError(f"a formula in the JSON cannot be read: {reason(error)}") from None
 
 
 def _automaton(document: Any) -> TimedAutomaton:
     disjuncts = to_sdnf(parse(_field(document, "formula", str))).disjuncts
     if len(disjuncts) != 1:
         raise AutomatonError(f"the JSON's formula has {len(disjuncts)} disjuncts; an automaton decides one")
-    clocks = tuple(_typed(name, str, "a clock") for name in _field(document, "clocks", list))
+    clocks = tuple(_name(name, "a clock") for name in _field(document, "clocks", list))
     places = _field(document, "locations", list)
-    names = tuple(_field(place, "name", str) for place in places)
+    names = tuple(_name(_field(place, "name", str), "a location") for place in places)
     kinds = [_field(place, "kind", str) for place in places]
     for kind in kinds:
         _index(kind, ("working", "accepting", "rejecting"), "kind of location")
@@ -230,8 +234,15 @@ def _clock_set(items: list[Any], clocks: tuple[str, ...]) -> frozenset[int]:
 def _typed(value: object, kind: type[Kind], what: str) -> Kind:
     # a JSON true is no number, though Python's True is an int
     if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
-        raise AutomatonError(f"{what} in the JSON is {value!r:.60}; give a value of type {kind.__name__}")
+        raise AutomatonError(f"{what} in the JSON is {brief(value)}; give a value of type {kind.__name__}")
     return value
+
+
+def _name(value: object, what: str) -> str:
+    name = _typed(value, str, what)
+    if len(name) > 100:
+        raise AutomatonError(f"the name {brief(name)} of {what} has {len(name)} characters; use 100 at the most")
+    return name
 
 
 def _field(record: object, key: str, kind: type[Kind]) -> Kind:
@@ -249,7 +260,7 @@ def _row(item: object, kinds: tuple[type[Any], ...], what: str) -> tuple[Any, ..
 
 def _index(name: object, names: tuple[str, ...], what: str) -> int:
     if name not in names:
-        raise AutomatonError(f"the {what} {name!r:.60} in the JSON is unknown; use one of {', '.join(names)}")
+        raise AutomatonError(f"the {what} {brief(name)} in the JSON is unknown; use one of {listed(names)}")
     return names.index(_typed(name, str, f"a {what}"))
 
 

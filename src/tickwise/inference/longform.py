@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._wording import brief, listed
 from tickwise.errors import DataError
 from tickwise.inference.trajectories import LabelledTrajectories
 
@@ -25,10 +26,10 @@ class LongTable:
         needed = FIXED if labelled or "label" in header else FIXED[:2]
         for name in needed:
             if name not in header:
-                raise DataError(f"{file} has no column {name!r}; it has {', '.join(header) or 'no header'}")
+                raise DataError(f"{file} has no column {name!r}; it has {listed(header) or 'no header'}")
         for name in header:
             if list(header).count(name) > 1:
-                raise DataError(f"{file} has two columns {name!r}; rename one")
+                raise DataError(f"{file} has two columns {brief(name)}; rename one")
         self.variables = [name for name in header if name not in FIXED]
         if not self.variables:
             raise DataError(f"{file} has no variable column beside {', '.join(FIXED)}; add one")
@@ -45,24 +46,25 @@ class LongTable:
         tick = self._number(cells, "tick", where)
         if tick != len(states):
             raise DataError(
-                f"{self.file}, {where}, column 'tick': {tick:g} where trajectory {name!r} needs {len(states)}; "
+                f"{self.file}, {where}, column 'tick': {tick:g} where trajectory {brief(name)} needs {len(states)}; "
                 "ticks go 0, 1, 2, … in order"
             )
         label = self._number(cells, "label", where) if "label" in cells else 1.0
         if self.labels.setdefault(name, label) != label or abs(label) != 1:
             known = self.labels[name]
-            reason = "use 1 or -1" if abs(label) != 1 else f"trajectory {name!r} had {known:g} before; use one label"
+            before = f"trajectory {brief(name)} had {known:g} before; use one label"
+            reason = "use 1 or -1" if abs(label) != 1 else before
             raise DataError(f"{self.file}, {where}, column 'label': {label:g}; {reason}")
         states.append([self._number(cells, variable, where) for variable in self.variables])
 
     def _number(self, cells: dict[str, Any], column: str, where: str) -> float:
         try:
             number = float(cells[column])
-        except (TypeError, ValueError):
-            shown = repr(cells[column])
-            raise DataError(f"{self.file}, {where}, column {column!r}: {shown} is not a number; fix it") from None
+        except (TypeError, ValueError, OverflowError):
+            place = f"{self.file}, {where}, column {brief(column)}"
+            raise DataError(f"{place}: {brief(cells[column])} is not a number; fix it") from None
         if not np.isfinite(number):
-            raise DataError(f"{self.file}, {where}, column {column!r}: {number} is not finite; fill it in")
+            raise DataError(f"{self.file}, {where}, column {brief(column)}: {number} is not finite; fill it in")
         return number
 
     def finish(self) -> LabelledTrajectories:

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.errors import DataError, MissingExtraError
+from tickwise._wording import brief, listed, reason
+from tickwise.errors import DataError, MissingExtraError, TickwiseError
 from tickwise.inference.longform import FIXED, LongTable
 from tickwise.inference.trajectories import LabelledTrajectories
 
@@ -38,8 +39,12 @@ def read_parquet(file: Path, labelled: bool) -> LabelledTrajectories:
                 data = rows.finish()
             pyarrow.default_memory_pool().release_unused()  # it would keep several times the size of the file
             return data
-    except (pyarrow.ArrowException, OSError) as error:
-        raise DataError(f"{file} is not a Parquet file: {str(error).splitlines()[0]}") from None
+    except TickwiseError:
+        raise
+    except MemoryError as error:
+        raise DataError(f"{file} does not fit into memory: {reason(error)}; split it into a folder of files") from None
+    except Exception as error:  # a damaged file fails in many ways
+        raise DataError(f"{file} is not a Parquet file of plain columns: {reason(error)}; write it anew") from None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,8 +89,8 @@ class ParquetParts:
             variables = variables or part.variables
             if part.variables != variables:
                 raise DataError(
-                    f"{file} has variables {', '.join(part.variables)} where {files[0].name} has "
-                    f"{', '.join(variables)}; use the same in all files"
+                    f"{file} has variables {listed(part.variables)} where {files[0].name} has "
+                    f"{listed(variables)}; use the same in all files"
                 )
             hashes = np.array([hash(name) for name in part.ids], dtype=np.int64)
             if np.isin(hashes, seen).any():
@@ -99,7 +104,7 @@ class ParquetParts:
             common = set(part.ids) & set(read_parquet(other, self.labelled).ids)
             if common:
                 name = next(name for name in part.ids if name in common)
-                raise DataError(f"trajectory {name!r} of {file} is in {other.name} too; make the names unique")
+                raise DataError(f"trajectory {brief(name)} of {file} is in {other.name} too; make the names unique")
 
 
 def _by_columns(read: Callable[[str], Any], names: list[str]) -> LabelledTrajectories | None:

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import csv
-import zlib
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.errors import DataError, MissingFileError
+from tickwise._wording import listed, reason
+from tickwise.errors import DataError, FileAccessError, MissingFileError, TickwiseError
 from tickwise.inference.longform import LongTable
 from tickwise.inference.parquet import ParquetParts, read_parquet
 from tickwise.inference.trajectories import LabelledTrajectories
@@ -35,19 +36,41 @@ def read_trajectories(path: str | Path, *, labelled: bool = True) -> LabelledTra
 
     Raises:
         MissingFileError: If there is no such file or folder.
+        FileAccessError: If it may not be read.
         MissingExtraError: If Parquet support is not installed.
         DataError: If the file cannot be read as trajectories; the message names the file, and the line and column.
     """
-    file = Path(path)
+    with _access(Path(path), "read"):
+        return _read(Path(path), labelled)
+
+
+def _read(file: Path, labelled: bool) -> LabelledTrajectories:
     if file.is_dir():
         return LabelledTrajectories.joined(read_parts(file, labelled=labelled))
     if not file.is_file():
+        if file.exists():
+            raise DataError(f"{file} is neither a file nor a folder; copy what it gives to a file")
         raise MissingFileError(f"there is no file {file}; check the path")
     readers = {".csv": _read_csv, ".parquet": read_parquet, ".npz": _read_npz}
     reader = readers.get(file.suffix.lower())
     if reader is None:
         raise DataError(f"{file} is not a .csv, .parquet or .npz file; convert it to one of these")
+    with file.open("rb"):  # the libraries that read it would say that it is damaged where it may not be read
+        pass
     return reader(file, labelled)
+
+
+@contextmanager
+def _access(path: Path, verb: str) -> Iterator[None]:
+    """Say which file the system would not give."""
+    try:
+        yield
+    except TickwiseError:
+        raise
+    except OSError as error:
+        raise FileAccessError(
+            f"cannot {verb} {path}: {error.strerror or reason(error)}; check its permissions, and the room on the disk"
+        ) from error
 
 
 def read_parts(folder: str | Path, *, labelled: bool = True) -> ParquetParts:
@@ -78,11 +101,15 @@ def write_npz(path: str | Path, data: LabelledTrajectories) -> None:
     Args:
         path: The file, with ending ``.npz``.
         data: The trajectories.
+
+    Raises:
+        FileAccessError: If it cannot be written.
+        DataError: If it has another ending.
     """
     file = Path(path)
     if file.suffix.lower() != ".npz":
         raise DataError(f"{file} does not end in .npz; use that ending")
-    with file.open("wb") as stream:
+    with _access(file, "write"), file.open("wb") as stream:
         np.savez_compressed(
             stream, X=data.values, y=data.labels, names=np.array(data.variables), lengths=data.lengths,
             ids=np.array(data.ids),
@@ -94,33 +121,43 @@ def _read_npz(file: Path, labelled: bool) -> LabelledTrajectories:
     needed = ("X", "names", "y") if labelled else ("X", "names")
     for name in needed:
         if name not in arrays:
-            raise DataError(f"{file} has no array {name!r}; it has {', '.join(arrays) or 'none'}")
-    for name in ("names", "ids"):
-        if name in arrays and arrays[name].ndim != 1:
-            raise DataError(f"{file}: {name!r} has shape {arrays[name].shape}; use a list of texts")
+            raise DataError(f"{file} has no array {name!r}; it has {listed(arrays) or 'none'}")
     labels = arrays.get("y", np.ones(len(np.atleast_1d(arrays["X"])), dtype=np.int8))
-    names, ids = [str(name) for name in arrays["names"]], arrays.get("ids")
+    names = _texts(file, arrays, "names")
+    ids = _texts(file, arrays, "ids") if "ids" in arrays else None
     try:
-        return LabelledTrajectories.from_arrays(
-            arrays["X"], labels, names, arrays.get("lengths"), None if ids is None else [str(name) for name in ids]
-        )
+        return LabelledTrajectories.from_arrays(arrays["X"], labels, names, arrays.get("lengths"), ids)
     except DataError as error:
         raise DataError(f"{file}: {error}") from None
 
 
+def _texts(file: Path, arrays: dict[str, NDArray[Any]], name: str) -> list[str]:
+    """An array of texts, or of numbers that are names."""
+    array = arrays[name]
+    if array.ndim != 1:
+        raise DataError(f"{file}: {name!r} has shape {array.shape}; use a list of texts")
+    try:
+        if array.dtype.kind == "S":
+            return [text.decode() for text in array.tolist()]
+        if array.dtype.kind in "Uiu":
+            return [str(text) for text in array]
+    except (SystemError, ValueError):  # NumPy's words for signs beyond Unicode
+        pass
+    raise DataError(f"{file}: {name!r} has type {array.dtype}, or signs that are none; use a list of texts")
+
+
 def _load_arrays(file: Path) -> dict[str, NDArray[Any]]:
     try:
-        with file.open("rb") as stream:  # np.load itself would leave a damaged file open
+        with file.open("rb") as stream, warnings.catch_warnings():  # np.load would leave a damaged file open
+            warnings.simplefilter("ignore")  # of headers that were written long ago
             archive = np.load(stream, allow_pickle=False)
             if isinstance(archive, np.ndarray):
                 raise ValueError("it is one array alone")
             with archive:
                 return {name: np.asarray(archive[name]) for name in archive.files}
-    # a damaged archive may fail in any of these ways; RuntimeError is that of an encrypted or unknown one
-    except (ValueError, OSError, EOFError, RuntimeError, BadZipFile, zlib.error, TokenError) as error:
-        reason = "".join(str(error).splitlines()[:1])
+    except Exception as error:  # a damaged archive fails in a dozen ways: what is in it has lengths and code of its own
         raise DataError(
-            f"{file} is not an npz file of plain arrays: {reason}; write X, y and names with numpy.savez"
+            f"{file} is not an npz file of plain arrays: {reason(error)}; write X, y and names with numpy.savez"
         ) from None
 
 
@@ -133,6 +170,8 @@ def _read_csv(file: Path, labelled: bool) -> LabelledTrajectories:
             for row in rows:
                 if row:
                     table.add(row, f"line {rows.line_num}")
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise DataError(f"{file} is not a CSV file in UTF-8: {error}") from None
+    except UnicodeDecodeError as error:
+        raise DataError(f"{file} is not a CSV file in UTF-8: {reason(error)}; save it as UTF-8") from None
+    except csv.Error as error:
+        raise DataError(f"{file} is not a CSV file, at line {rows.line_num}: {error}; check the quotes there") from None
     return table.finish()

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tickwise._wording import brief
 from tickwise.errors import DataError
 
 
@@ -47,7 +48,7 @@ class LabelledTrajectories:
         for kind, names in (("variable", variables), ("trajectory id", ids)):
             if len(set(names)) < len(names):
                 twice = next(name for name in names if names.count(name) > 1)
-                raise DataError(f"{kind} {twice!r} occurs twice; make the names unique")
+                raise DataError(f"{kind} {brief(twice)} occurs twice; make the names unique")
         lengths = _whole(self.lengths, n, "length")
         labels = _whole(self.labels, n, "label")
         if len(ids) != n:
@@ -196,8 +197,9 @@ def _real(array: ArrayLike, what: str) -> NDArray[np.float64]:
     try:
         found = np.asarray(array)
         if found.dtype.kind in "biufO":  # NumPy would cut complex numbers and read texts and dates as numbers
-            return found.astype(np.float64, copy=False)
-    except (TypeError, ValueError):
+            with np.errstate(over="ignore"):  # what is infinite then is refused where it may not be
+                return found.astype(np.float64, copy=False)
+    except (TypeError, ValueError, OverflowError):
         pass
     raise DataError(f"{what} are not real numbers of one shape; use a float array")
 
@@ -234,7 +236,7 @@ def _whole(numbers: ArrayLike, n: int, what: str) -> NDArray[np.int64]:
         raise DataError(
             f"{what} {array[_first(wrong)]} of row {_first(wrong)} is not a whole number; use whole numbers"
         )
-    return array.astype(np.int64)
+    return np.clip(array, -(2.0**53), 2.0**53).astype(np.int64)  # whatever lies beyond is no length and no label
 
 
 def _first(wrong: NDArray[np.bool_]) -> int:
@@ -245,14 +247,14 @@ def _check_lengths(lengths: NDArray[np.int64], ticks: int, ids: tuple[str, ...])
     wrong = (lengths < 1) | (lengths > ticks)
     if wrong.any():
         row = _first(wrong)
-        raise DataError(f"trajectory {ids[row]!r} has length {lengths[row]}; use 1 to {ticks} states")
+        raise DataError(f"trajectory {brief(ids[row])} has length {lengths[row]}; use 1 to {ticks} states")
 
 
 def _check_labels(labels: NDArray[np.int64], ids: tuple[str, ...]) -> None:
     wrong = np.abs(labels) != 1
     if wrong.any():
         row = _first(wrong)
-        raise DataError(f"trajectory {ids[row]!r} has label {labels[row]}; use 1 or -1")
+        raise DataError(f"trajectory {brief(ids[row])} has label {labels[row]}; use 1 or -1")
 
 
 def _check_states(
@@ -263,6 +265,6 @@ def _check_states(
     if wrong.any():
         row, tick, column = (int(index) for index in np.argwhere(wrong)[0])
         raise DataError(
-            f"trajectory {ids[row]!r}, tick {tick}, variable {variables[column]!r} is {values[row, tick, column]}; "
-            "fill it in, or shorten the trajectory before it"
+            f"trajectory {brief(ids[row])}, tick {tick}, variable {brief(variables[column])} is "
+            f"{values[row, tick, column]}; fill it in, or shorten the trajectory before it"
         )

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from lark import Lark, Token, Transformer, UnexpectedInput, UnexpectedToken, v_args
 
+from tickwise._wording import brief
 from tickwise.errors import FormulaError, ParseError
 from tickwise.logic.region import intersect
 from tickwise.logic.syntax import Always, And, Bound, Box, Constant, Eventually, Formula, Interval, Not, Or
@@ -19,6 +20,9 @@ _DEEPEST = 100
 
 # characters shown on either side of an error
 _MARGIN = 60
+
+# the last tick: what follows a formula, such as the guards of its automaton, counts in 32 bits
+_LAST_TICK = 2**31 - 2
 
 _EXPECTED = {
     "LSQB": "an interval such as [0,5]",
@@ -64,9 +68,12 @@ def parse(text: str) -> Formula:
         The formula; ``parse(str(phi)) == phi``.
 
     Raises:
+        FormulaError: If it is not text at all.
         ParseError: If the text is not a formula. The message has one line that says what was found where and
             what was expected, then the line of the text, then a caret under the place.
     """
+    if not isinstance(text, str):
+        raise FormulaError(f"the formula {brief(text)} is of type {type(text).__name__}; give it as text")
     for tie in _AMBIGUOUS_TIE.finditer(text):
         if tie["tie"]:
             message = "found '~', which could be a space or a negation; leave it out, or write \\lnot"
@@ -156,16 +163,18 @@ class _Builder(Transformer[Token, _Piece]):
 
     def chain(self, first: Token, left: Token, name: Token, right: Token, last: Token) -> _Piece:
         if _symbol(left)[0] != _symbol(right)[0] or "==" in (_symbol(left), _symbol(right)):
-            message = f"{left} and {right} do not make a range; write one such as 3 <= {name} <= 4"
+            message = f"{left} and {right} do not make a range; write one such as 3 <= {_cut(name)} <= 4"
             raise _Problem(right, message)
         return _compare(first, name, (_MIRRORED[_symbol(left)], first), (_symbol(right), last))
 
     def interval(self, opening: Token, start: Token, end: Token) -> Interval:
         for tick in (start, end):
             if re.fullmatch(r"[−-]\d+", tick):
-                raise _Problem(tick, f"the interval bound {tick} is before tick 0; use 0 or more")
+                raise _Problem(tick, f"the interval bound {_cut(tick)} is before tick 0; use 0 or more")
             if not re.fullmatch(r"\+?\d+", tick):
-                raise _Problem(tick, f"the interval bound {tick} is not a whole number of ticks; round it")
+                raise _Problem(tick, f"the interval bound {_cut(tick)} is not a whole number of ticks; round it")
+            if len(tick.lstrip("+0")) > len(str(_LAST_TICK)) or int(tick) > _LAST_TICK:
+                raise _Problem(tick, f"the interval bound {_cut(tick)} is too large; use {_LAST_TICK} at the most")
         try:
             return Interval(int(start), int(end))
         except FormulaError as error:
@@ -185,7 +194,7 @@ def _compare(place: Token, name: Token, *sides: tuple[str, Token]) -> _Piece:
     for symbol, token in sides:
         number = float(token.replace("−", "-"))
         if math.isinf(number):
-            raise _Problem(token, f"the number {token} is too large")
+            raise _Problem(token, f"the number {_cut(token)} is too large")
         if symbol[0] in ">=":
             lower = number
         if symbol[0] in "<=":
@@ -196,6 +205,11 @@ def _compare(place: Token, name: Token, *sides: tuple[str, Token]) -> _Piece:
     except FormulaError as error:
         raise _Problem(place, error) from None
     return _Piece(Box((bound,)), place, bare=True)
+
+
+def _cut(token: Token) -> str:
+    """A token as a message shows it."""
+    return token if len(token) <= 40 else f"{token[:39]}…"
 
 
 def _symbol(token: Token) -> str:
@@ -227,7 +241,7 @@ def _unexpected(text: str, problem: UnexpectedInput) -> ParseError:
     else:
         position = problem.pos_in_stream or 0
         word = re.compile(r"\w+|\\[A-Za-z]+|[\s\S]").match(text, position)
-        found = repr(word.group()) if word else "nothing"
+        found = brief(word.group(), 40) if word else "nothing"
     expected = _expectation(accepted)
     if "_RPAR" in accepted and openings:
         expected += f" (closing the '(' of {_place(text, openings[-1].start_pos)})"
