@@ -6,13 +6,14 @@ import os
 import stat
 import tempfile
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 from numba.cpython.unsafe.numbers import trailing_zeros as _trailing_zeros
 
-__all__ = ["njit", "trailing_zeros"]
+__all__ = ["cache_folder", "njit", "threading_layers", "trailing_zeros"]
 
 trailing_zeros: Any = _trailing_zeros  # how many bits below the lowest set one; in compiled code only
 
@@ -65,3 +66,19 @@ def njit(function: Function) -> Function:
     except RuntimeError:  # no place for the cache: compile anew in every process
         compiled = numba.njit(**options)(function)
     return compiled  # type: ignore[no-any-return]
+
+
+def _nothing() -> None:
+    """Compiled by no one; where its code would be kept is where that of this package is."""
+
+
+def cache_folder() -> Path | None:
+    """Where compiled code is kept between runs; None where no folder can be written."""
+    path = getattr(getattr(njit(_nothing), "_cache", None), "cache_path", None)
+    return None if path is None else Path(path)
+
+
+def threading_layers() -> tuple[str, ...]:
+    """The layers for loops that numba itself runs in parallel; this package's kernels run in Python's threads."""
+    pools = {"tbb": "tbbpool", "omp": "omppool", "workqueue": "workqueue"}
+    return tuple(name for name, pool in pools.items() if find_spec(f"numba.np.ufunc.{pool}") is not None)

@@ -4,10 +4,12 @@ from tickwise.cli.app import app, main
 from tickwise.cli.automaton import automaton
 from tickwise.cli.check import check
 from tickwise.cli.compare import compare
+from tickwise.cli.doctor import doctor
+from tickwise.cli.examples import described
 from tickwise.cli.infer import infer
 from tickwise.cli.reproduce import effect, report, reproduce
 
-for _each in (reproduce, infer, check, automaton, compare, report, effect):  # in the order of the help
-    app.command()(_each)
+for _each in (reproduce, infer, check, automaton, compare, report, effect, doctor):  # in the order of the help
+    app.command(**described(_each))(_each)
 
 __all__ = ["app", "main"]

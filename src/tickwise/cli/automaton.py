@@ -7,14 +7,17 @@ from typing import Annotated
 
 import typer
 
+from tickwise.cli import completion
 from tickwise.cli.app import command
 from tickwise.errors import ConfigurationError
+
+_FORMATS = "dot, json, mermaid, svg, tchecker or uppaal."
 
 
 @command
 def automaton(
     formula: Annotated[str, typer.Argument(help="A formula in sequential disjunctive normal form.")],
-    format: Annotated[str, typer.Option(help="dot, json, mermaid, svg, tchecker or uppaal.")] = "dot",
+    format: Annotated[str, typer.Option(help=_FORMATS, autocompletion=completion.formats)] = "dot",
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="Write to this file instead of printing.")
     ] = None,

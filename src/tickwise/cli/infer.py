@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tickwise.cli import completion
 from tickwise.cli.app import COLUMNS, INTERRUPTED, JsonFlag, command, messages, output, print_json
 from tickwise.cli.evidence import page_path, show_explanation, show_validation, write_page
 from tickwise.errors import ConfigurationError
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 _PAGE = "Also write a page with the formula, what it separates and a drawing, as one HTML file."
 _FOLDS = "Also infer without each of so many parts, and judge on it (cross-validation)."
+_SEARCH = "exact, joint (all primitives at once) or the paper's swarm."
 
 
 @command
@@ -33,7 +35,7 @@ def infer(
     information_weight: Annotated[float, typer.Option(min=0, help="The weight of the information gain, λ.")] = 0.01,
     depth: Annotated[int, typer.Option(min=1, help="The depth of the decision tree, h_max.")] = 2,
     class_weight: Annotated[str | None, typer.Option(help="'balanced' lets both labels count the same.")] = None,
-    search: Annotated[str, typer.Option(help="exact, joint (all primitives at once) or the paper's swarm.")] = "exact",
+    search: Annotated[str, typer.Option(help=_SEARCH, autocompletion=completion.searches)] = "exact",
     levels: Annotated[int, typer.Option(min=1, help="The most thresholds an exact search has of a variable.")] = 32,
     seconds: Annotated[float | None, typer.Option(help="The most that one exact search may take.")] = None,
     holdout: Annotated[

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tickwise.cli import completion
 from tickwise.cli.app import command, messages, output
+from tickwise.cli.listing import show
 from tickwise.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -18,12 +20,15 @@ if TYPE_CHECKING:
 
 Processes = Annotated[int | None, typer.Option(min=1, help="Processes (one a core).")]
 Address = Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Dask cluster that does the jobs.")]
+_STUDY = "What: case1, case2, random (pairs of tasks), pair-07 (one), or all."
+_EFFECT = "The setting, such as rate or tau; another word lists them all."
+_EFFECT_STUDY = "The study that it is measured on (the telling one)."
 _PROTOCOL = "Whose formulas to learn with: paper (200 negatives, swarm) or full (all negatives, exact search)."
 
 
 @command
 def reproduce(
-    study: Annotated[str, typer.Argument(help="What: case1, case2, random (pairs of tasks), pair-07 (one), or all.")],
+    study: Annotated[str, typer.Argument(help=_STUDY, autocompletion=completion.studies)],
     runs: Annotated[int | None, typer.Option(min=1, help="Independent runs (10; 3 with --quick).")] = None,
     tasks: Annotated[int | None, typer.Option(min=1, help="Random pairs of tasks (50; 4 with --quick).")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Fewer runs, episodes and tasks.")] = False,
@@ -31,7 +36,7 @@ def reproduce(
     workers: Processes = None,
     cluster: Address = None,
     seed: Annotated[int, typer.Option(min=0, help="The root seed.")] = 0,
-    protocol: Annotated[str, typer.Option(help=_PROTOCOL)] = "paper",
+    protocol: Annotated[str, typer.Option(help=_PROTOCOL, autocompletion=completion.protocols)] = "paper",
 ) -> None:
     """Reproduce the paper's case studies, with a report; a second call goes on where the first one stopped.
 
@@ -83,7 +88,7 @@ def _show(summary: Mapping[str, Any], folder: Path) -> None:
 
     tables = suite_tables if "suite" in summary else study_tables
     for table in tables(summary, folder):
-        output.print(table)
+        show(table)
     output.print(f"report: {folder / 'report.html'}")
 
 
@@ -102,8 +107,8 @@ def report(
 
 @command
 def effect(
-    name: Annotated[str, typer.Argument(help="The setting, such as rate or tau; another word lists them all.")],
-    study: Annotated[str | None, typer.Option(help="The study that it is measured on (the telling one).")] = None,
+    name: Annotated[str, typer.Argument(help=_EFFECT, autocompletion=completion.effects)],
+    study: Annotated[str | None, typer.Option(help=_EFFECT_STUDY, autocompletion=completion.case_studies)] = None,
     runs: Annotated[int | None, typer.Option(min=1, help="Collections a value (3; 1 with --quick).")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Few values.")] = False,
     out: Annotated[Path | None, typer.Option(help="The run folder (runs/effect-NAME).")] = None,

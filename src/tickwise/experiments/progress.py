@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -16,6 +17,8 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
+
+_log = logging.getLogger(__name__)
 
 _MOST_SHOWN = 16
 """Running jobs that are shown at once."""
@@ -149,6 +152,7 @@ class _Phase:
     def finish(self, job: int) -> None:
         """Note that a job is done."""
         self._finished[job] = True
+        _log.debug("%s: %s is done after %.1f s", self.name, self._items[job].title, self.elapsed)
 
     def share(self) -> float:
         """How much of the phase is done, from 0 to 1."""

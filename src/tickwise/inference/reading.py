@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import logging
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +18,8 @@ from tickwise.errors import DataError, FileAccessError, MissingFileError, Tickwi
 from tickwise.inference.longform import LongTable
 from tickwise.inference.parquet import ParquetParts, read_parquet
 from tickwise.inference.trajectories import LabelledTrajectories
+
+_log = logging.getLogger(__name__)
 
 
 def read_trajectories(path: str | Path, *, labelled: bool = True) -> LabelledTrajectories:
@@ -41,7 +44,11 @@ def read_trajectories(path: str | Path, *, labelled: bool = True) -> LabelledTra
         DataError: If the file cannot be read as trajectories; the message names the file, and the line and column.
     """
     with _access(Path(path), "read"):
-        return _read(Path(path), labelled)
+        found = _read(Path(path), labelled)
+    _log.debug(
+        "%s: %d trajectories of %s, %d ticks at the most", path, len(found), listed(found.variables), found.horizon + 1
+    )
+    return found
 
 
 def _read(file: Path, labelled: bool) -> LabelledTrajectories:

@@ -1,0 +1,54 @@
+"""The examples that each command's help ends with."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any, TypedDict
+
+EXAMPLES = {
+    "reproduce": (
+        "tickwise reproduce all --workers 4",
+        "tickwise reproduce case2 --protocol full --runs 3",
+        "tickwise reproduce random --tasks 20 --seed 2",
+    ),
+    "infer": ("tickwise infer logs.npz --size 2 --rate 0.99", "tickwise infer logs.csv --json > formula.json"),
+    "check": (
+        "tickwise check 'F[1,15] G[0,4] (3 <= x <= 4)' logs.csv --json",
+        "tickwise check 'F[0,9] (x > 3)' logs.csv | grep false",
+    ),
+    "automaton": (
+        "tickwise automaton 'F[0,9] (x > 3)' | dot -Tpdf > automaton.pdf",
+        "tickwise automaton 'F[0,9] (x > 3)' --format svg > automaton.svg",
+    ),
+    "compare": ("tickwise compare 'F[0,9] (x > 1)' 'G[3,5] (y < 2)' --json",),
+    "report": ("tickwise report runs/all",),
+    "effect": ("tickwise effect tau --study case1 --runs 5", "tickwise effect list"),
+    "doctor": ("tickwise doctor --json > doctor.json",),
+}
+"""Examples beside the one in a command's docstring, by the command's name."""
+
+_MARK = "For example:"
+
+
+class Description(TypedDict):
+    """What typer has to know of a command: its help, and what stands below its options."""
+
+    help: str
+    epilog: str
+
+
+def described(function: Callable[..., Any]) -> Description:
+    """A command's help, with its examples below the options.
+
+    Args:
+        function: The command; its docstring may have an example after ``For example:``, to its end.
+
+    Returns:
+        Arguments of typer's ``command``.
+    """
+    words, _, example = (inspect.getdoc(function) or "").partition(_MARK)
+    first = [" ".join(example.split())] if example else []
+    lines = [f"  {each}" for each in (*first, *EXAMPLES.get(function.__name__, ()))]
+    # the mark keeps the lines that follow it as they are
+    return {"help": words.strip(), "epilog": "\b\n" + "\n".join(("Examples:", *lines)) if lines else ""}
