@@ -117,7 +117,7 @@ def test_no_variables_wanted() -> None:
         (
             pd.DataFrame(ONE, columns=["x", "x"]),
             {},
-            "the trajectory has two columns of the same name; rename one",
+            "the trajectory has two columns of the same name, 'x'; rename one",
         ),
     ],
 )

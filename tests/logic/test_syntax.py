@@ -36,8 +36,8 @@ def test_verdicts_are_kleene_numbers() -> None:
     [
         (-1, 3, "interval [-1,3] starts before tick 0; use a start of 0 or more"),
         (9, 3, "interval [9,3] is reversed; write [3,9]"),
-        (0.5, 3, "interval bound 0.5 is not a whole number of ticks"),
-        (0, True, "interval bound True is not a whole number of ticks"),
+        (0.5, 3, "interval bound 0.5 is not a whole number of ticks; round it"),
+        (0, True, "interval bound True is not a whole number of ticks; round it"),
     ],
 )
 def test_bad_interval(start: int, end: int, message: str) -> None:
@@ -51,7 +51,7 @@ def test_bad_interval(start: int, end: int, message: str) -> None:
     [
         (("x", math.nan, 1.0), "a bound of 'x' is NaN; use a number"),
         (("x", 2.0, 1.0), "the range of 'x' is empty: 2 > 1; swap the bounds"),
-        (("x", 1.0, 1.0, True, False), "the range of 'x' is empty: both bounds are 1"),
+        (("x", 1.0, 1.0, True, False), "the range of 'x' is empty: both bounds are 1; use <= or >="),
         (("x",), "the range of 'x' has no bound; leave the variable out"),
     ],
 )

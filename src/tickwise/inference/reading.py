@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import logging
+import os
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise._wording import listed, reason
+from tickwise._wording import brief, listed, reason
 from tickwise.errors import DataError, FileAccessError, MissingFileError, TickwiseError
 from tickwise.inference.longform import LongTable
 from tickwise.inference.parquet import ParquetParts, read_parquet
@@ -43,6 +44,8 @@ def read_trajectories(path: str | Path, *, labelled: bool = True) -> LabelledTra
         MissingExtraError: If Parquet support is not installed.
         DataError: If the file cannot be read as trajectories; the message names the file, and the line and column.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise DataError(f"the path {brief(path)} is of type {type(path).__name__}; give text or a Path")
     with _access(Path(path), "read"):
         found = _read(Path(path), labelled)
     _log.debug(

@@ -212,6 +212,8 @@ def _states(array: ArrayLike) -> NDArray[np.float64]:
 
 
 def _padded(arrays: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    if not hasattr(arrays, "__iter__"):
+        raise DataError(f"the trajectories are {brief(arrays)}; give an array, or a list of arrays")
     rows = [_real(array, f"the states of trajectory {index}") for index, array in enumerate(arrays)]
     if not rows:
         raise DataError("there is no trajectory; give at least one")

@@ -56,14 +56,20 @@ class InferenceSettings:
     nesting_cost: float = 1.0
 
     def __post_init__(self) -> None:
-        if self.size < 1 or self.depth < 1:
-            raise ConfigurationError(f"size is {self.size} and depth is {self.depth}; use 1 or more for both")
+        for name in ("size", "depth"):
+            count = getattr(self, name)
+            if not isinstance(count, int | np.integer) or count < 1:
+                raise ConfigurationError(f"{name} is {count!r}; use a whole number, 1 or more")
+        for name in ("rate", "information_weight", "nesting_cost"):
+            number = getattr(self, name)
+            if not isinstance(number, int | float | np.number):
+                raise ConfigurationError(f"{name} is {number!r}; use a number")
         if not 0 < self.rate <= 1:
             raise ConfigurationError(f"rate is {self.rate}; use a number above 0 and at most 1")
-        if not self.information_weight >= 0:
-            raise ConfigurationError(f"information_weight is {self.information_weight}; use 0 or more")
-        if not self.nesting_cost >= 0:
-            raise ConfigurationError(f"nesting_cost is {self.nesting_cost}; use 0 or more")
+        for name in ("information_weight", "nesting_cost"):
+            number = getattr(self, name)
+            if not 0 <= number < np.inf:
+                raise ConfigurationError(f"{name} is {number}; use 0 or more")
 
     def nesting_penalty(self, trajectories: int, horizon: int) -> float:
         """What the duration of a nested structure costs, in units of J.

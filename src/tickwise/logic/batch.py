@@ -109,7 +109,11 @@ def _is_list_of_trajectories(X: Any) -> bool:
 
 def _numeric(X: Any, what: str) -> NDArray[np.float64]:
     try:
+        if np.iscomplexobj(X):
+            raise DataError(f"{what} is complex; give real numbers only")
         return np.asarray(X, dtype=np.float64)
+    except DataError:
+        raise
     except (TypeError, ValueError) as error:
         if "inhomogeneous" in str(error) or "sequence" in str(error):
             raise DataError(f"{what} is ragged; give a list of (ticks, variables) arrays") from None
@@ -140,8 +144,6 @@ def _table(
     own = list(X.columns)
     labels = [str(name) for name in own] if variables is None else list(variables)
     _require_all_named(len(own), labels, what)
-    if len(set(labels)) < len(labels):
-        raise DataError(f"{what} has two columns of the same name; rename one")
     _require(names, labels, what)
     if not names:
         return np.empty((len(X), 0)), []
@@ -173,6 +175,9 @@ def _select(
 def _require_all_named(columns: int, variables: Sequence[str], what: str) -> None:
     if columns != len(variables):
         raise DataError(f"{what} has {columns} column(s) but variables names {len(variables)}; name each one")
+    for name in variables:
+        if list(variables).count(name) > 1:
+            raise DataError(f"{what} has two columns of the same name, {name!r}; rename one")
 
 
 def _require(names: Sequence[str], there: Sequence[str], what: str) -> None:

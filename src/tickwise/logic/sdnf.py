@@ -8,6 +8,7 @@ from enum import StrEnum
 from itertools import product
 from typing import TypeAlias, cast
 
+from tickwise._wording import brief
 from tickwise.errors import FormulaError
 from tickwise.logic.region import complement, intersect
 from tickwise.logic.syntax import Always, And, Box, Constant, Eventually, Formula, Interval, Not, Or
@@ -187,12 +188,14 @@ def to_sdnf(phi: Formula | SDNF) -> SDNF:
         The normal form.
 
     Raises:
-        FormulaError: If the formula has none: a predicate stands outside every temporal operator, operators
-            alternate three times, a constant or a combination of predicates that is no box or complement
-            occurs, or the effect windows of a conjunction overlap.
+        FormulaError: If it is no formula, or has no normal form: a predicate stands outside every temporal
+            operator, operators alternate three times, a constant or a combination of predicates that is no box
+            or complement occurs, or the effect windows of a conjunction overlap.
     """
     if isinstance(phi, SDNF):
         return phi
+    if not isinstance(phi, Formula):
+        raise FormulaError(f"{brief(phi)} is of type {type(phi).__name__}; give a formula, as parse reads it from text")
     return SDNF(tuple(_sequential(conjunction) for conjunction in _expand(phi, positive=True)))
 
 

@@ -107,7 +107,7 @@ class Interval:
     def __post_init__(self) -> None:
         for bound in (self.start, self.end):
             if isinstance(bound, bool) or not isinstance(bound, int):
-                raise FormulaError(f"interval bound {bound!r} is not a whole number of ticks")
+                raise FormulaError(f"interval bound {bound!r} is not a whole number of ticks; round it")
         if self.start < 0:
             raise FormulaError(f"interval [{self.start},{self.end}] starts before tick 0; use a start of 0 or more")
         if self.start > self.end:
@@ -139,7 +139,7 @@ class Bound:
                 f"the range of {self.variable!r} is empty: {self.lower:g} > {self.upper:g}; swap the bounds"
             )
         if self.lower == self.upper and (self.lower_strict or self.upper_strict):
-            raise FormulaError(f"the range of {self.variable!r} is empty: both bounds are {self.lower:g}")
+            raise FormulaError(f"the range of {self.variable!r} is empty: both bounds are {self.lower:g}; use <= or >=")
         if math.isinf(self.lower) and math.isinf(self.upper):
             raise FormulaError(f"the range of {self.variable!r} has no bound; leave the variable out")
         # an infinite side has no strictness: keep one form, so that equal ranges are equal
@@ -169,7 +169,14 @@ class Box(Formula):
     @classmethod
     def of(cls, **ranges: tuple[float, float]) -> Box:
         """A closed box, for instance ``Box.of(x=(3, 4), y=(3, 5))``."""
-        return cls(tuple(Bound(name, float(low), float(high)) for name, (low, high) in ranges.items()))
+        bounds = []
+        for name, given in ranges.items():
+            try:
+                low, high = map(float, given)
+            except (TypeError, ValueError):
+                raise FormulaError(f"the range of {name!r} is {given!r}; give two numbers, such as (3, 4)") from None
+            bounds.append(Bound(name, low, high))
+        return cls(tuple(bounds))
 
     @property
     def variables(self) -> tuple[str, ...]:
