@@ -19,6 +19,7 @@ from tickwise.experiments.inferences import infer, study_formulas
 from tickwise.experiments.job import Job, Outcome, Report
 from tickwise.experiments.measures import block_means, goal_reached
 from tickwise.experiments.memory import peak_memory_mib
+from tickwise.experiments.recording import Recorder, recording_points
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import Collection, StudySpec, environment_of
 from tickwise.rl.qlearning import Problem, collect, evaluate, learn
@@ -152,7 +153,7 @@ def evaluation_points(spec: StudySpec, episodes: int) -> list[int]:
 
 
 def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outcome:
-    """Q-learning (Step 3) of the source task or of one of Methods I to IV, with evaluations on fixed seeds."""
+    """Q-learning (Step 3) of the source task or of one of Methods I to IV, evaluated, and recorded, on fixed seeds."""
     learning, subject = spec.learning, job.subject
     settings = learning.source if subject == "source" else learning.settings
     problem = learning_problem(spec, store, subject)
@@ -165,17 +166,21 @@ def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outco
     fixed = seed_sequence(spec.seed, spec.name, "evaluate")
     episodes = learning.source_episodes if subject == "source" else learning.most_episodes[subject]
     points = evaluation_points(spec, episodes)
+    recorder = Recorder(problem, fixed, recording_points(points))
     values = [evaluate(problem, q, fixed, learning.evaluation_episodes)]
+    recorder.look(0, q)
     parts = []
     for before, now in pairwise(points):
         report(before, episodes)
         parts.append(learn(problem, q, settings, rng, now - before))
         values.append(evaluate(problem, q, fixed, learning.evaluation_episodes))
+        recorder.look(now, q)
     returns = np.concatenate(parts)
     arrays: dict[str, NDArray[Any]] = {
         "blocks": block_means(returns, learning.block),
         "evaluation_episodes": np.array(points, dtype=np.int64),
         "evaluation_returns": np.array(values, dtype=np.float64),
+        **recorder.arrays(),
     }
     if subject == "source":
         arrays["q"] = q
