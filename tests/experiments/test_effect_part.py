@@ -13,7 +13,7 @@ from tickwise.experiments import effect_measures as m
 from tickwise.experiments.effect_catalog import EFFECTS
 from tickwise.experiments.effect_part import effect_part, effect_verdict
 from tickwise.experiments.figures import draw_effect, effect
-from tickwise.experiments.report import render_page
+from tickwise.experiments.page import render_page
 
 EFFECT = EFFECTS["trajectories"]
 ENVIRONMENT = {"version": "1.2.3", "command": "tickwise effect trajectories --seed 0", "workers": 2}

@@ -10,7 +10,7 @@ from markupsafe import Markup
 from tickwise.experiments.case_studies import find_study
 from tickwise.experiments.choices import signed
 from tickwise.experiments.effects import Effect
-from tickwise.experiments.report import Part, inline_svg, template
+from tickwise.experiments.page import Part, inline_svg, template
 
 _POINTS = "A point is a collection; the line goes through the medians, and the range is shaded."
 

@@ -20,7 +20,8 @@ from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.pairs import gather_pairs
 from tickwise.experiments.pairs_part import pairs_part
 from tickwise.experiments.protocols import inference_seconds
-from tickwise.experiments.report import Part, render_page, study_part
+from tickwise.experiments.page import Part, render_page
+from tickwise.experiments.report import study_part
 from tickwise.experiments.runner import Unit, planned_jobs, unfinished
 from tickwise.experiments.store import Store, read_configuration, read_json, write_json, write_text
 from tickwise.experiments.study import StudySpec

@@ -60,7 +60,7 @@ class Recorder:
             q: The Q-table, shape ``(memory states, states, actions)``.
         """
         if learned in self.points:
-            self._parts.append({"at": np.int64(learned), **greedy_episodes(self.problem, q, self.seed, EPISODES)})
+            self._parts.append({"at": np.array(learned), **greedy_episodes(self.problem, q, self.seed, EPISODES)})
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What was recorded: the arrays of `greedy_episodes` with a first axis for the points, and `at`."""
@@ -83,8 +83,8 @@ def greedy_episodes(
         episodes: How many episodes E.
 
     Returns:
-        ``states``, int32, and ``memory`` (the memory's states), int32, shape ``(E, horizon + 1)``, -1 after an episode's
-        end; ``actions``, int8, shape ``(E, horizon)``, likewise; ``disjunct``, int16, shape ``(E,)``: the disjunct
+        ``states`` and ``memory`` (the memory's states), int32, shape ``(E, horizon + 1)``, -1 after an episode's end;
+        ``actions``, int8, shape ``(E, horizon)``, likewise; ``disjunct``, int16, shape ``(E,)``: the disjunct
         whose automaton the memory follows, -1 for a memory without automata; ``returns``, float32, shape ``(E,)``.
     """
     task, memory, horizon = problem.task, problem.memory, problem.task.horizon

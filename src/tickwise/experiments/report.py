@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, Template
 from markupsafe import Markup
 
 from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.experiments.captions import captions
 from tickwise.experiments.choices import capital, choices, signed
+from tickwise.experiments.curves import curve_data
+from tickwise.experiments.page import Part, inline_svg, json_island, render_page, template
+from tickwise.experiments.playback import playback
 from tickwise.experiments.protocol_rows import inference_rows, protocol_rows
 from tickwise.experiments.regions import NamedFormula, overlap, ranges_text, read_formula
 from tickwise.experiments.study import StudySpec
@@ -31,7 +31,7 @@ _TITLES = {
     "target_without_information": "Target task without the information gain (λ = 0)",
 }
 _SECTIONS = {
-    "transferability": "Transferability", "formulas": "Formulas", "protocols": "Protocols", "learning": "Learning",
+    "player": "Watch the robot", "transferability": "Transferability", "formulas": "Formulas", "protocols": "Protocols", "learning": "Learning",
     "data": "Data", "robustness": "Robustness", "choices": "Choices", "settings": "Settings",
 }  # fmt: skip
 _METHODS = {
@@ -40,49 +40,6 @@ _METHODS = {
     "III": "extended states of φᵀ",
     "IV": "extended states of φᵀ, starting with the transferred Q̄",
 }
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A part of a page, such as one study.
-
-    Attributes:
-        key: Its anchor.
-        title: What it is.
-        verdict: What was found, in sentences.
-        links: Anchors and labels of its sections.
-        body: The sections as HTML.
-        headline: The most important of it in one sentence, for the head of a page with several parts.
-    """
-
-    key: str
-    title: str
-    verdict: Sequence[str]
-    links: Sequence[tuple[str, str]]
-    body: Markup
-    headline: str = ""
-
-
-def render_page(
-    title: str, verdict: Sequence[str], parts: Sequence[Part], environment: Mapping[str, Any], *, seed: int
-) -> str:
-    """A page as HTML with everything in it: styles and figures inline, no scripts, nothing from a network.
-
-    Args:
-        title: The title.
-        verdict: What was found, in sentences.
-        parts: The parts; a single one gets no heading of its own.
-        environment: Command, versions and costs.
-        seed: The root seed.
-
-    Returns:
-        The page. All text from data is escaped; the same input gives the same page.
-    """
-    page = template("page").render(
-        title=title, verdict=verdict, parts=parts, environment=_environment_rows(environment), seed=seed,
-        version=environment["version"], command=environment["command"],
-    )  # fmt: skip
-    return page.rstrip() + "\n"
 
 
 def render_report(results: Mapping[str, Any], spec: StudySpec, figures: Mapping[str, str]) -> str:
@@ -113,6 +70,7 @@ def study_part(
     """
     summary = results["summary"]
     prefix = f"{spec.name}-" if nested else ""
+    played, curves = playback(results, spec, _METHODS), curve_data(results, spec)
     body = template("study").render(
         h=3 if nested else 2,
         prefix=prefix,
@@ -135,34 +93,11 @@ def study_part(
         settings=settings_tree(spec.as_dict()),
         choices=choices(spec),
         command=summary["command"],
+        player=None if played is None else json_island(played),
+        curves=None if curves is None else json_island(curves),
     )
     links = [(prefix + name, label) for name, label in _SECTIONS.items()]
-    return Part(spec.name, spec.title, verdict(summary, spec), links, Markup(body), headline(summary, spec))
-
-
-def template(name: str) -> Template:
-    """A template of this package; it escapes what it is given."""
-    environment = Environment(
-        loader=PackageLoader("tickwise.experiments"), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
-        lstrip_blocks=True,
-    )  # fmt: skip
-    environment.filters["count"] = count
-    return environment.get_template(f"{name}.html.j2")
-
-
-def inline_svg(name: str, svg: str) -> Markup:
-    """An SVG document as an element of a page.
-
-    Its identifiers get the figure's name in front, since those of several figures would clash; its size is left to
-    the page, and comments are dropped.
-    """
-    body = re.sub(r"<!--.*?-->", "", svg[svg.index("<svg") :], flags=re.DOTALL)
-    body = re.sub(r'\bid="', f'id="{name}-', body)
-    body = re.sub(r'href="#', f'href="#{name}-', body)
-    body = re.sub(r"url\(#", f"url(#{name}-", body)
-    opening, rest = body.split(">", 1)
-    opening = re.sub(r'\s(width|height)="[^"]*"', "", opening) + f' role="img" aria-labelledby="{name}-caption"'
-    return Markup(f"{opening}>{rest.strip()}")
+    return Part(spec.name, spec.title, verdict(summary, spec), links, Markup(body), headline(summary, spec), True)
 
 
 def settings_tree(value: Any) -> Any:
@@ -322,13 +257,3 @@ def _robust_row(inference: Mapping[str, Any], spec: StudySpec) -> dict[str, Any]
         "transferable": inference["target"]["transferable"],
         "reason": inference["target"]["reason"],
     }
-
-
-def _environment_rows(environment: Mapping[str, Any]) -> list[tuple[str, str]]:
-    names = {
-        "version": "Tickwise", "python": "Python", "cores": "processor cores", "workers": "worker processes",
-        "seconds": "wall-clock time in seconds", "job_seconds": "time of all jobs together in seconds",
-        "peak_memory_mib": "peak memory in MiB",
-    }  # fmt: skip
-    rows = [(names.get(key, key), value) for key, value in environment.items() if key != "command"]
-    return [(name, f"{value:,}" if isinstance(value, int | float) else str(value)) for name, value in rows]

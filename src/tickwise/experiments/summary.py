@@ -18,6 +18,7 @@ from tickwise.experiments.measures import (
     stays,
 )
 from tickwise.experiments.protocols import TASKS, exact_regions, gather_protocols
+from tickwise.experiments.recording import PREFIX
 from tickwise.experiments.runner import available_methods
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import StudySpec, environment_of
@@ -84,7 +85,8 @@ def gather(spec: StudySpec, store: Store, version: str) -> dict[str, Any]:
 
 def _source_curve(store: Store, run: int) -> dict[str, Any]:
     learned = store.load(Job("learn", "source", run).name)
-    return {key: learned[key] for key in ("run", "evaluation_episodes", "evaluation_returns")}
+    wanted = ("run", "evaluation_episodes", "evaluation_returns")
+    return {key: value for key, value in learned.items() if key in wanted or key.startswith(PREFIX)}
 
 
 def _counts(store: Store, task: str, run: int) -> dict[str, Any]:

@@ -5,22 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullLocator
-from numpy.typing import NDArray
 
+from tickwise.experiments.curves import Curve, evaluation_curve, interval, training_curve
 from tickwise.experiments.figures.style import GREEN, METHODS, canvas
 from tickwise.experiments.study import StudySpec
-
-_BINS = 100
-_BINS_A_DECADE = 12
-_RESAMPLES = 2_000
-
-Curve = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Episodes, shape ``(points,)``, and the runs' returns there, shape ``(runs, points)``."""
 
 
 def draw(results: Mapping[str, Any], spec: StudySpec) -> Figure | None:
@@ -57,40 +49,6 @@ def return_limits(summary: Mapping[str, Any]) -> tuple[float, float]:
     """The range of an axis of returns: from always failing to V*, and some room."""
     room = 0.04 * (summary["v_star"] - summary["fail"])
     return summary["fail"] - room, summary["v_star"] + 2.5 * room
-
-
-def training_curve(runs: Sequence[Mapping[str, Any]], block: int, shown: int) -> Curve:
-    """Returns in the first training episodes, averaged over bins of whole blocks."""
-    count = min(shown // block, *(len(run["blocks"]) for run in runs))
-    width = max(1, shown // block // _BINS)
-    bins = max(1, count // width)
-    episodes = np.asarray((np.arange(bins) + 0.5) * width * block, dtype=np.float64)
-    rows = np.stack([np.asarray(run["blocks"][:count], dtype=np.float64) for run in runs])
-    usable = rows[:, : bins * width] if count >= width else rows
-    returns: NDArray[np.float64] = usable.reshape(len(runs), bins, -1).mean(axis=2)
-    return episodes, returns
-
-
-def evaluation_curve(runs: Sequence[Mapping[str, Any]]) -> Curve:
-    """Returns of the greedy policy, averaged over equal bins of a log axis, as far as all runs go."""
-    shortest = min(runs, key=lambda run: len(run["evaluation_episodes"]))
-    episodes = np.asarray(shortest["evaluation_episodes"], dtype=np.float64)
-    rows = np.stack([np.asarray(run["evaluation_returns"][: len(episodes)], dtype=np.float64) for run in runs])
-    later = episodes > 0  # a log axis has no 0
-    episodes, rows = episodes[later], rows[:, later]
-    number = np.floor(np.log10(episodes) * _BINS_A_DECADE)
-    groups = [np.flatnonzero(number == value) for value in np.unique(number)]
-    middles = np.array([episodes[group].mean() for group in groups])
-    returns = [rows[:, group].mean(axis=1) for group in groups]
-    return middles, np.stack(returns, axis=1) if returns else np.empty((len(runs), 0))
-
-
-def interval(rows: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The 95 % percentile bootstrap interval of the mean over runs, from ``(runs, points)`` to ``(points,)``."""
-    draws = np.random.default_rng(0).integers(len(rows), size=(_RESAMPLES, len(rows)))
-    share = np.stack([(draws == run).mean(axis=1) for run in range(len(rows))], axis=1)
-    low, high = np.percentile(share @ rows, [2.5, 97.5], axis=0)
-    return low, high
 
 
 def short(value: float) -> str:
