@@ -31,8 +31,8 @@ _TITLES = {
     "target_without_information": "Target task without the information gain (λ = 0)",
 }
 _SECTIONS = {
-    "player": "Watch the robot", "transferability": "Transferability", "formulas": "Formulas", "protocols": "Protocols", "learning": "Learning",
-    "data": "Data", "robustness": "Robustness", "choices": "Choices", "settings": "Settings",
+    "player": "Watch what was learned", "transferability": "Transferability", "formulas": "Formulas",
+    "protocols": "Protocols", "learning": "Learning", "data": "Data", "robustness": "Robustness", "choices": "Choices", "settings": "Settings",
 }  # fmt: skip
 _METHODS = {
     "I": "Q-learning on τ-states",

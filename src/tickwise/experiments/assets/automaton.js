@@ -64,7 +64,9 @@ class AutomatonView {
     const height = 80 + (highest - lowest) * ROW + RADIUS + 14;
     this.edges = new Map();
     this.circles = [];
-    this.element = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: "automaton", role: "img" });
+    const look = columns > 1 ? "automaton long" : "automaton";
+    this.element = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: look, role: "img" });
+    this.element.style.maxWidth = `${width}px`;
     this.title = svg("title");
     this.element.append(this.title, svg("defs", {}, ...["plain", "taken"].map((kind) => this.marker(kind))));
     this.drawEdges();

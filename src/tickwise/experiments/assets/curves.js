@@ -35,7 +35,7 @@ class Chart {
     this.reset = html("button", { type: "button", disabled: true }, "Reset zoom");
     this.reset.addEventListener("click", () => this.zoom(this.full));
     this.readout = html("div", { class: "readout", "aria-live": "polite" });
-    const head = html("p", { class: "chart-head" }, html("strong", {}, chart.title), " ", html("span", { class: "note" }, `mean return over ${chart.unit}${chart.log ? ", log scale" : ""}`), this.reset);
+    const head = html("p", { class: "chart-head" }, html("strong", {}, chart.title), " ", html("span", { class: "note" }, `mean return by ${chart.unit}`), this.reset);
     this.element = html("div", { class: "chart" }, head, this.plot, this.readout);
     this.plot.addEventListener("pointerdown", (event) => this.press(event));
     this.plot.addEventListener("pointermove", (event) => this.move(event));
@@ -69,7 +69,7 @@ class Chart {
     const width = this.plot.clientWidth;
     if (!width) return;
     const height = clamp(width * 0.6, 220, 340);
-    this.box = { left: 48, right: width - 10, top: 10, bottom: height - 26 };
+    this.box = { left: 48, right: width - 18, top: 10, bottom: height - 26 };
     this.plot.setAttribute("viewBox", `0 0 ${width} ${height}`);
     this.plot.style.height = `${height}px`;
     const { left, right, top, bottom } = this.box;

@@ -20,8 +20,10 @@ const svg = (name, attributes = {}, ...children) =>
 const clamp = (value, low, high) => Math.min(Math.max(value, low), high);
 
 /** A number as the report writes it: separators, a real minus, and so many decimals at most. */
-const numberText = (value, decimals = 0) =>
-  value.toLocaleString("en-US", { maximumFractionDigits: decimals }).replace("-", "−");
+const numberText = (value, decimals = 0) => {
+  const text = value.toLocaleString("en-US", { maximumFractionDigits: decimals });
+  return text === "-0" ? "0" : text.replace("-", "−");
+};
 
 /** The data that stand in the script element after an element. */
 const dataAfter = (element) => {

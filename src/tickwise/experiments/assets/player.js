@@ -12,6 +12,8 @@ class Player {
     const telling = ["IV", "III", "II", "I", "source"].map((key) => data.methods.findIndex((each) => each.key === key));
     this.chosen.method = telling.find((index) => index >= 0);
     this.chosen.point = this.points.length - 1;
+    const returns = this.points.at(-1).episodes.map((each) => each.return);
+    this.chosen.episode = returns.indexOf(Math.max(...returns));
     root.hidden = false;
     root.tabIndex = 0;
     this.listen();
@@ -113,6 +115,9 @@ class Player {
     this.find("show", "world").replaceChildren(this.world.element);
     this.readFormula();
     this.find("show", "outcome").textContent = this.outcome();
+    const { title, runs } = this.method;
+    const run = `run ${runs[this.chosen.run].run}, after ${numberText(this.point.learned)} learned episodes`;
+    this.find("show", "episode").textContent = `${title}; ${run}, episode ${this.chosen.episode + 1}.`;
     this.go(0);
   }
 
@@ -127,20 +132,26 @@ class Player {
     const cells = this.episode.states.map((state) => placeOf(state, this.task.size).cell);
     const timeline = new Timeline(this.task.deadline, (tick) => this.go(tick));
     const automata = this.formula ? this.formula.automata : [];
+    this.followed = this.method.follows ? Math.max(this.episode.disjunct, 0) : 0;
     this.views = automata.map((automaton, number) => {
       const holding = automaton.parts.map(({ region, complemented }) =>
         cells.map((cell) => (this.formula.regions[region].cells[cell] === "1") !== complemented));
       const letters = cells.map((_, tick) =>
         holding.reduce((letter, holds, bit) => letter | (holds[tick] ? 1 << bit : 0), 0));
       const run = runOf(automaton, letters);
-      const title = automata.length > 1 ? `Disjunct ${number + 1} of ${this.formula.symbol}: location` : `${this.formula.symbol}: location`;
-      const followed = this.method.follows && automata.length > 1 && this.episode.disjunct === number;
+      const which = automata.length > 1 ? `, disjunct ${number + 1}` : "";
+      const title = `${this.formula.symbol}${which}: location`;
+      const followed = this.method.follows && automata.length > 1 && this.followed === number;
       timeline.addLocations(title, automaton, run, followed ? "the one that the learner follows" : null);
       automaton.parts.forEach((part, index) => timeline.addPart(part, holding[index]));
       return { automaton, run, view: new AutomatonView(automaton), clocks: html("p", { class: "clocks" }) };
     });
-    const panels = this.views.map(({ view, clocks }) =>
-      html("div", { class: "automaton-box" }, html("div", { class: "scroll" }, view.element), clocks));
+    const panels = this.views.map(({ view, clocks }, number) => {
+      const parts = [html("div", { class: "scroll" }, view.element), clocks];
+      if (number === this.followed) return html("div", { class: "automaton-box" }, ...parts);
+      return html("details", { class: "automaton-box" }, html("summary", {}, `The automaton of disjunct ${number + 1}`), ...parts);
+    });
+    if (panels.length) panels.unshift(...panels.splice(this.followed, 1));
     const observer = html("p", { class: "note" }, "Method I does not know this automaton; it only looks on.");
     const missing = html("p", { class: "missing" }, "No formula was inferred, so there is no automaton.");
     const notes = panels.length ? (this.method.follows ? [] : [observer]) : [missing];
@@ -179,20 +190,20 @@ class Player {
   play() {
     clearInterval(this.timer);
     this.timer = setInterval(() => this.go(this.tick + 1), 1000 / Number(this.find("choose", "speed").value));
-    this.label("Pause", "⏸");
+    this.label("Pause", "M6 5h4v14H6ZM14 5h4v14h-4Z");
   }
 
   pause() {
     clearInterval(this.timer);
     this.timer = null;
-    this.label("Play", "▶");
+    this.label("Play", "M7 4l13 8-13 8Z");
   }
 
-  label(word, sign) {
+  label(word, icon) {
     const button = this.find("do", "play");
     button.setAttribute("aria-label", word);
     button.title = `${word} (Space)`;
-    button.firstElementChild.textContent = sign;
+    button.querySelector("path").setAttribute("d", icon);
     // a reader of the screen hears each step, but not each tick that is played
     this.find("show", "now").setAttribute("aria-live", this.playing ? "off" : "polite");
   }

@@ -19,7 +19,8 @@ class Timeline {
   strip(marks) {
     const cursor = svg("rect", { y: 0, width: 1, height: 1, class: "cursor" });
     const box = { viewBox: `0 0 ${this.ticks} 1`, preserveAspectRatio: "none", class: "lane-strip", "aria-hidden": "true" };
-    return { strip: svg("svg", box, svg("rect", { width: this.ticks, height: 1, class: "ground" }), ...marks, cursor), cursor };
+    const ground = svg("rect", { width: this.ticks, height: 1, class: "ground" });
+    return { strip: svg("svg", box, ground, ...marks, cursor), cursor };
   }
 
   cells(kinds) {
@@ -31,11 +32,14 @@ class Timeline {
   }
 
   addLocations(title, automaton, run, followed) {
-    const cells = this.cells(run.map(({ location }) => automaton.locations[location].fill));
+    const cells = this.cells(
+      run.map(({ location }) => (outcomeOf(automaton, location) > 0 ? "accepted" : automaton.locations[location].fill)),
+    );
     const { strip, cursor } = this.strip(cells);
     const sign = html("span", { class: "sign" });
     const name = html("strong");
-    const text = html("p", { class: "lane-text" }, sign, title, " ", name, followed ? html("span", { class: "note" }, followed) : null);
+    const note = followed ? html("span", { class: "note" }, followed) : null;
+    const text = html("p", { class: "lane-text" }, sign, title, " ", name, note);
     this.element.append(html("div", { class: "lane" }, text, strip));
     this.lanes.push({ cells, cursor, update: (tick) => {
       const { location } = run[tick];

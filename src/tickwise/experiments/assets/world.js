@@ -13,7 +13,7 @@ class WorldView {
   constructor(task, formula) {
     this.size = task.size;
     const side = task.size * CELL;
-    this.element = svg("svg", { viewBox: `0 0 ${side + EDGE + 6} ${side + EDGE + 6}`, class: "map", role: "img" });
+    this.element = svg("svg", { viewBox: `0 0 ${side + EDGE + 8} ${side + EDGE + 10}`, class: "map", role: "img" });
     this.title = svg("title");
     this.element.append(this.title, this.floor(side));
     this.truth = svg("g", { class: "truth" }, ...task.landmarks.map((each) => this.landmark(each)));
@@ -34,7 +34,7 @@ class WorldView {
   }
 
   y(value) {
-    return 4 + (this.size - value) * CELL;
+    return 8 + (this.size - value) * CELL;
   }
 
   floor(side) {
@@ -53,7 +53,7 @@ class WorldView {
     return { x: this.x(left), y: this.y(top), width: (right - left) * CELL, height: (top - bottom) * CELL };
   }
 
-  landmark({ name, rectangle }) {
+  landmark({ name, rectangle, colour }) {
     const frame = this.frame(rectangle);
     const lines = [];
     // slanted lines, cut at the frame by hand: a pattern or a clip path would need an identifier of its own
@@ -64,7 +64,7 @@ class WorldView {
     const above = rectangle[3] + 0.6 <= this.size;
     const y = above ? frame.y - 5 : frame.y + frame.height + 16;
     const label = svg("text", { x: frame.x + frame.width, y, "text-anchor": "end" }, name);
-    return svg("g", {}, svg("path", { d: lines.join(" "), class: "hatch" }), svg("rect", frame), label);
+    return svg("g", {}, svg("path", { d: lines.join(" "), class: "hatch" }), svg("rect", { ...frame, class: colour }), label);
   }
 
   region({ name, rectangle, colour, cells }) {
