@@ -164,41 +164,6 @@ def test_automata_of_other_formulas(results: dict[str, Any], target: str | None,
     assert ("none: the two are not structurally equivalent" in said) == (mapping is False)
 
 
-def test_curves_average_blocks_and_evaluations():
-    runs = [
-        {
-            "blocks": np.arange(5_000, dtype=np.float32) + 10 * run,
-            "evaluation_episodes": np.array([0, 100, 200, 1_000]),
-            "evaluation_returns": np.array([-10.0, 1.0, 2.0, 3.0]) + run,
-        }
-        for run in range(2)
-    ]
-    episodes, returns = curves.training_curve(runs, 10, 50_000)
-    assert episodes[:2].tolist() == [250, 750]
-    assert returns[:, 0].tolist() == [24.5, 34.5]  # the mean of blocks 0 to 49
-    assert returns.shape == (2, 100)
-    episodes, returns = curves.evaluation_curve(runs)
-    assert episodes.tolist() == [100, 200, 1_000]
-    assert returns.tolist() == [[1, 2, 3], [2, 3, 4]]
-
-
-def test_curves_of_few_episodes():
-    runs = [{"blocks": np.array([1.0, 3.0]), "evaluation_episodes": np.array([0]), "evaluation_returns": np.ones(1)}]
-    _, returns = curves.training_curve(runs, 10, 50_000)
-    assert returns.tolist() == [[2.0]]
-    episodes, returns = curves.evaluation_curve(runs)
-    assert (episodes.shape, returns.shape) == ((0,), (1, 0))
-
-
-def test_the_interval_holds_the_mean_and_is_a_point_for_equal_runs():
-    rows = np.random.default_rng(1).normal(size=(10, 50))
-    low, high = curves.interval(rows)
-    assert (low < rows.mean(axis=0)).all()
-    assert (rows.mean(axis=0) < high).all()
-    same = curves.interval(np.full((4, 3), 7.0))
-    assert np.allclose(same, 7.0)
-
-
 @pytest.mark.parametrize(("value", "text"), [(100, "100"), (2_500, "2.5k"), (10_000, "10k"), (2_000_000, "2M")])
 def test_short_numbers(value: float, text: str):
     assert curves.short(value) == text

@@ -8,8 +8,8 @@ from typing import Any
 from markupsafe import Markup
 
 from tickwise.experiments.choices import signed
-from tickwise.experiments.pairs import KINDS
 from tickwise.experiments.page import Part, inline_svg, template
+from tickwise.experiments.pairs import KINDS
 from tickwise.experiments.report import settings_tree
 from tickwise.experiments.study import StudySpec
 from tickwise.logic.parse import parse

@@ -52,12 +52,8 @@ def playback(results: Mapping[str, Any], spec: StudySpec, methods: Mapping[str, 
         task = "source" if name == "source" else "target"
         runs = [run for run in learned[name] if f"{PREFIX}states" in run]
         key = _FORMULAS[name]
-        entry: dict[str, Any] = {
-            "key": name,
-            "title": titles[name],
-            "task": task,
-            "formula": key if formulas[key] else None,
-        }
+        entry: dict[str, Any] = {"key": name, "title": titles[name], "task": task}
+        entry["formula"] = key if formulas[key] else None
         entry["follows"] = name != "I"
         entry["runs"] = [{"run": run["run"] + 1, "points": _points(run, tables[task])} for run in runs]
         played.append(entry)

@@ -17,10 +17,10 @@ from tickwise.experiments.effect_part import effect_part
 from tickwise.experiments.effects import effect_results
 from tickwise.experiments.figures import draw_effect, draw_figures, draw_pairs
 from tickwise.experiments.memory import peak_memory_mib
+from tickwise.experiments.page import Part, render_page
 from tickwise.experiments.pairs import gather_pairs
 from tickwise.experiments.pairs_part import pairs_part
 from tickwise.experiments.protocols import inference_seconds
-from tickwise.experiments.page import Part, render_page
 from tickwise.experiments.report import study_part
 from tickwise.experiments.runner import Unit, planned_jobs, unfinished
 from tickwise.experiments.store import Store, read_configuration, read_json, write_json, write_text

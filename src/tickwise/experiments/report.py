@@ -32,7 +32,8 @@ _TITLES = {
 }
 _SECTIONS = {
     "player": "Watch what was learned", "transferability": "Transferability", "formulas": "Formulas",
-    "protocols": "Protocols", "learning": "Learning", "data": "Data", "robustness": "Robustness", "choices": "Choices", "settings": "Settings",
+    "protocols": "Protocols", "learning": "Learning", "data": "Data", "robustness": "Robustness",
+    "choices": "Choices", "settings": "Settings",
 }  # fmt: skip
 _METHODS = {
     "I": "Q-learning on τ-states",
