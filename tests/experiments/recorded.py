@@ -20,7 +20,7 @@ EVERY_OPERATOR = (
 
 def results(spec: StudySpec, formula: str | None = EVERY_OPERATOR, seed: int = 0) -> dict[str, Any]:
     """Results of a study in which methods I and III have recordings, and the source of method IV too."""
-    found = synthetic.results(spec, formulas=(synthetic.SOURCE, formula, synthetic.PLAIN))
+    found = synthetic.results(synthetic.small(spec.runs), formulas=(synthetic.SOURCE, formula, synthetic.PLAIN))
     rng = np.random.default_rng(seed)
     for method in ("I", "III"):
         for run in found["methods"][method]:

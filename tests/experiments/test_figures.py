@@ -10,7 +10,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 import matplotlib
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 

@@ -41,7 +41,8 @@ def test_only_the_pages_own_style_and_script_pass(interactive: bool):
     }  # fmt: skip
     scripts = re.findall(r"<script>(.*?)</script>", html, re.DOTALL)
     assert len(scripts) == interactive
-    wanted |= {"script-src": f"'{digest(script)}'" for script in scripts}
+    if interactive:
+        wanted["script-src"] = f"'{digest(scripts[0])}'"
     assert rules == wanted
     assert "\r" not in html  # a browser would hash another text
 

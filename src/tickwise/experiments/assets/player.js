@@ -14,6 +14,7 @@ class Player {
     this.chosen.point = this.points.length - 1;
     const returns = this.points.at(-1).episodes.map((each) => each.return);
     this.chosen.episode = returns.indexOf(Math.max(...returns));
+    root.previousElementSibling.remove(); // it says that there is no player
     root.hidden = false;
     root.tabIndex = 0;
     this.listen();

@@ -1,0 +1,431 @@
+"""The report in a real browser: the player, the curves, keys, phones, dark rooms and paper."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.experiments import recorded, synthetic
+from tests.experiments.tiny import TINY
+from tickwise.automata.build import timed_automata
+from tickwise.automata.run import EdgeStep, run
+from tickwise.envs.gridworld import HEADINGS
+from tickwise.experiments.figures import FIGURES
+from tickwise.experiments.jobs import learning_problem
+from tickwise.experiments.recording import PREFIX
+from tickwise.experiments.report import render_report
+from tickwise.experiments.store import Store
+from tickwise.logic.parse import parse
+from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.semantics import verdict
+
+playwright = pytest.importorskip("playwright.sync_api", reason="the report's browser tests need playwright")
+
+CHROMIUM = next((path for path in map(Path, ("/usr/bin/chromium", "/usr/bin/chromium-browser")) if path.exists()), None)
+SPEC = synthetic.small()
+DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
+SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 5"><path d="M0 0"/></svg>'
+Open = Callable[..., Any]
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="the report's browser tests need /usr/bin/chromium")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=str(CHROMIUM), args=["--no-sandbox", "--disable-gpu"])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture(scope="module")
+def results() -> dict[str, Any]:
+    return recorded.results(SPEC)
+
+
+@pytest.fixture(scope="module")
+def report(results: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    path.write_text(render_report(results, SPEC, dict.fromkeys(FIGURES, SVG)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def opened(browser: Any, report: Path) -> Iterator[Open]:
+    """Opens a page that must say nothing on its console and ask for nothing but itself."""
+    contexts, complaints = [], []
+
+    def open_page(path: Path = report, **options: Any) -> Any:
+        contexts.append(browser.new_context(**{"viewport": {"width": 1200, "height": 900}, **options}))
+        page = contexts[-1].new_page()
+        page.on("console", lambda message: complaints.append(message.text))
+        page.on("pageerror", lambda error: complaints.append(str(error)))
+        page.on("request", lambda request: complaints.append(request.url) if request.url != path.as_uri() else None)
+        page.goto(path.as_uri())
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+    assert complaints == []
+
+
+def choose(page: Any, **choices: str) -> None:
+    for name, label in choices.items():
+        select = page.locator(f"[data-choose={name}]")
+        texts = select.locator("option").all_text_contents()
+        select.select_option(index=next(i for i, text in enumerate(texts) if text.startswith(label)))
+
+
+def told(page: Any, name: str) -> Any:
+    return json.loads(page.locator(".player").get_attribute(f"data-{name}"))
+
+
+def watch(page: Any) -> list[dict[str, Any]]:
+    """Step with the keys' events through the chosen episode, and read at each tick what is to be seen."""
+    ticks = page.evaluate(
+        """() => {
+          const player = document.querySelector(".player");
+          const press = (key) => player.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
+          const all = (selector, read) => [...player.querySelectorAll(selector)].map(read);
+          press("Home");
+          const last = Number(player.querySelector("[data-choose=tick]").max);
+          return Array.from({ length: last + 1 }, (_, tick) => {
+            if (tick) press("ArrowRight");
+            return {
+              tick: Number(player.dataset.tick),
+              locations: JSON.parse(player.dataset.locations),
+              clocks: JSON.parse(player.dataset.clocks),
+              verdicts: all(".lane-text[data-verdict]", (x) => Number(x.dataset.verdict)),
+              current: all(".location.current .name", (x) => x.textContent),
+              taken: all(".edge.taken", (x) => x.getAttribute("d")).length,
+              lit: all(".region", (x) => x.classList.contains("lit")),
+              world: player.querySelector(".map > title").textContent,
+              robot: player.querySelector(".robot").style.transform,
+            };
+          });
+        }"""
+    )
+    assert [seen["tick"] for seen in ticks] == list(range(len(ticks)))
+    return list(ticks)
+
+
+def test_the_automata_run_as_the_semantics_say(opened: Open, results: dict[str, Any]):
+    page = opened()
+    choose(page, method="III", run="2", point="1,000")
+    sdnf = to_sdnf(parse(recorded.EVERY_OPERATOR))
+    automata = timed_automata(sdnf)
+    states = results["methods"]["III"][1][PREFIX + "states"][1]
+    mdp = SPEC.target.mdp()
+    said: set[int] = set()
+    for episode in (0, 1):
+        choose(page, episode=str(episode + 1))
+        path = mdp.coordinates[states[episode][states[episode] >= 0]]
+        runs = [run(automaton, path, variables=mdp.variables) for automaton in automata]
+        steps = [[step for step in one.steps if isinstance(step, EdgeStep)] for one in runs]
+        parts = [part.formula for disjunct in sdnf.disjuncts for part in disjunct.primitives]
+        ticks = watch(page)
+        assert len(path) == len(ticks)
+        for tick, seen in enumerate(ticks):
+            assert seen["locations"] == [own[tick].target for own in steps]
+            assert seen["clocks"] == [list(own[tick].after) for own in steps]
+            wanted = [int(verdict(part, path[: tick + 1], variables=mdp.variables)) for part in parts]
+            assert seen["verdicts"] == wanted
+            said |= set(wanted)
+    assert said == {-1, 0, 1}
+
+
+def test_the_drawing_highlights_the_current_location(opened: Open, results: dict[str, Any]):
+    page = opened()
+    choose(page, method="III")
+    automata = timed_automata(parse(recorded.EVERY_OPERATOR))
+    followed = int(results["methods"]["III"][0][PREFIX + "disjunct"][1, 0])
+    order = [followed, 1 - followed]  # the one that is followed stands first
+    seen = set()
+    for tick in watch(page):
+        names = [automata[number].locations[tick["locations"][number]] for number in order]
+        assert [name.translate(DIGITS) for name in tick["current"]] == names
+        working = [name for name in names if name.startswith("q")]
+        assert len(working) <= tick["taken"] <= len(names)
+        seen.add(names[0])
+    assert len(seen) > 1
+
+
+def test_recorded_memory_is_where_the_player_is(finished: Path, opened: Open):
+    page = opened(finished / "report.html")
+    problem = learning_problem(TINY, Store(finished), "IV")
+    (table,) = problem.memory.tables
+    content = Store(finished).load("learn-IV-1")
+    choose(page, method="IV", run="2")
+    for point, learned in enumerate(content[PREFIX + "at"]):
+        choose(page, point=f"{learned:,} ", episode="1")
+        memory = content[PREFIX + "memory"][point, 0]
+        for tick, seen in enumerate(watch(page)):
+            assert seen["locations"] == [int(table.location[memory[tick]])]
+            active = table.automaton.active[table.location[memory[tick]]]
+            (clocks,) = seen["clocks"]
+            assert [clocks[clock] for clock in active] == [int(table.clocks[memory[tick], clock]) for clock in active]
+
+
+def test_the_robot_is_where_it_was(opened: Open, results: dict[str, Any]):
+    page = opened()
+    choose(page, method="III", run="1", point="0 ", episode="2")
+    states = results["methods"]["III"][0][PREFIX + "states"][0, 1]
+    before = None
+    for tick, seen in enumerate(watch(page)):
+        i, j, heading = SPEC.target.world.place(int(states[tick]))
+        assert f"the robot is in cell ({i}, {j}), facing {HEADINGS[heading]}" in seen["world"]
+        x, y, turn = (float(number) for number in re.findall(r"-?[\d.]+", seen["robot"]))
+        assert ((x - 22) / 40, 9 - (y - 8) / 40) == (i + 0.5, j + 0.5)
+        assert (-turn / 90) % 4 == heading
+        assert before is None or abs(turn - before) <= 90
+        before = turn
+
+
+def test_regions_light_up_with_the_robot_in_them(opened: Open, results: dict[str, Any]):
+    page = opened()
+    choose(page, method="III")
+    boxes = [part.box for one in to_sdnf(parse(recorded.EVERY_OPERATOR)).disjuncts for part in one.primitives]
+    boxes = list(dict.fromkeys(boxes))
+    mdp = SPEC.target.mdp()
+    states = results["methods"]["III"][0][PREFIX + "states"][1, 0]
+    counts = set()
+    for tick, seen in enumerate(watch(page)):
+        place = mdp.coordinates[states[tick]]
+        inside = [all(b.lower <= place["xy".index(b.variable)] <= b.upper for b in box.bounds) for box in boxes]
+        assert seen["lit"] == inside
+        counts.add(sum(inside))
+    assert len(counts) > 1
+
+
+def test_every_method_run_and_episode_can_be_chosen(opened: Open):
+    page = opened()
+    titles = page.locator("[data-choose=method] option").all_text_contents()
+    assert [title.split(":")[0] for title in titles] == ["I", "III", "source task"]
+    seen = set()
+    for change in (
+        {"method": "I", "run": "1", "point": "0 ", "episode": "1"}, {"method": "III"}, {"method": "source"},
+        {"run": "2"}, {"run": "3"}, {"point": "1,000 "}, {"episode": "2"}, {"point": "0 "},
+    ):  # fmt: skip
+        choose(page, **change)
+        seen.add(page.locator(".ghost").get_attribute("points"))
+    assert len(seen) == 8
+    choose(page, method="I")
+    assert page.get_by_text("Method I does not know this automaton").is_visible()
+
+
+def test_it_plays_pauses_and_ends_at_the_last_tick(opened: Open):
+    page = opened()
+    page.locator("[data-choose=speed]").select_option("16")
+    play = page.locator("[data-do=play]")
+    play.click()
+    assert play.get_attribute("aria-label") == "Pause"
+    playwright.expect(page.locator(".player")).to_have_attribute("data-tick", re.compile(r"[3-9]|\d\d"))
+    play.click()
+    tick = told(page, "tick")
+    page.wait_for_timeout(150)
+    assert told(page, "tick") == tick
+    assert play.get_attribute("aria-label") == "Play"
+    page.locator("[data-do=last]").click()
+    assert told(page, "tick") == int(page.locator("[data-choose=tick]").get_attribute("max"))
+    play.click()  # from the end it begins again
+    assert told(page, "tick") < 5
+
+
+def test_keys_do_all_that_buttons_do(opened: Open):
+    page = opened()
+    player = page.locator(".player")
+    player.focus()
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowLeft")
+    assert told(page, "tick") == 1
+    page.keyboard.press("End")
+    last = told(page, "tick")
+    assert last >= 38
+    page.keyboard.press("Home")
+    assert told(page, "tick") == 0
+    page.keyboard.press("Space")
+    assert page.locator("[data-do=play]").get_attribute("aria-label") == "Pause"
+    page.keyboard.press("Space")
+    assert page.locator("[data-do=play]").get_attribute("aria-label") == "Play"
+    page.keyboard.press("+")
+    assert page.locator("[data-choose=speed]").input_value() == "8"
+    page.keyboard.press("-")
+    for key, name, values in ((".", "episode", 2), ("[", "point", 2), ("m", "method", 3), ("r", "run", 3)):
+        select = page.locator(f"[data-choose={name}]")
+        first = select.input_value()
+        page.keyboard.press(key)
+        assert select.input_value() != first
+        for _ in range(values - 1):
+            page.keyboard.press(key)
+        assert select.input_value() == first
+    page.locator(".keys summary").click()
+    named = page.locator(".keys kbd").all_text_contents()
+    assert {"Space", "←", "→", "Home", "End", "-", "+", ",", ".", "[", "]", "m", "r"} == set(named)
+
+
+def test_the_focus_is_seen_and_controls_have_names(opened: Open):
+    page = opened()
+    page.locator("[data-choose=method]").focus()
+    for _ in range(12):
+        page.keyboard.press("Tab")
+        outline = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+        assert outline != "none", page.evaluate("document.activeElement.outerHTML.slice(0, 200)")
+    for control in page.locator(".player button, .player select, .player input").all():
+        assert control.evaluate(
+            "x => x.getAttribute('aria-label') || (x.labels.length && x.labels[0].textContent.trim())"
+        )
+    assert page.locator(".player").get_attribute("role") == "group"
+    assert page.locator("[data-choose=tick]").get_attribute("aria-valuetext") == "tick 0 of 40"
+
+
+def test_the_scrubber_and_the_lanes_choose_the_tick(opened: Open):
+    page = opened()
+    page.locator("[data-choose=tick]").fill("17")
+    assert told(page, "tick") == 17
+    lane = page.locator(".lane-strip").first
+    box = lane.bounding_box()
+    lane.click(position={"x": box["width"] * 25.5 / 41, "y": 5})
+    assert told(page, "tick") == 25
+
+
+def test_curves_tell_their_values_under_the_pointer(opened: Open):
+    page = opened()
+    plot = page.locator(".plot").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    text = page.locator(".readout").first.text_content()
+    episodes = int(re.match(r"([\d,]+) episodes", text)[1].replace(",", ""))
+    data = json.loads(page.locator(".live-curves + script").text_content())
+    curve = data["charts"][0]["levels"][0]["IV"]
+    index = int(np.argmin(np.abs(np.array(curve["x"]) - episodes)))
+    mean, low, high = (f"{curve[name][index]:g}".replace("-", "−") for name in ("mean", "low", "high"))
+    assert f"IV: {mean} [{low}, {high}]" in text
+    assert page.locator(".plot").first.locator(".dot").count() == 4
+
+
+def test_curves_zoom_by_dragging_and_by_keys(opened: Open):
+    page = opened()
+    plot, reset = page.locator(".plot").first, page.locator(".chart-head button").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    before = plot.locator(".mean").first.get_attribute("d")
+    page.mouse.move(box["x"] + 100, box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 180, box["y"] + 65)
+    assert plot.locator(".selection").get_attribute("visibility") == "visible"
+    page.mouse.up()
+    first, last = (int(plot.get_attribute(f"data-{end}")) for end in ("from", "to"))
+    assert 0 < first < last < 50_000
+    assert plot.locator(".mean").first.get_attribute("d") != before
+    reset.click()
+    assert (plot.get_attribute("data-from"), plot.get_attribute("data-to")) == ("0", "50000")
+    assert reset.is_disabled()
+    plot.focus()
+    page.keyboard.press("+")
+    assert int(plot.get_attribute("data-to")) < 50_000
+    inner = int(plot.get_attribute("data-from"))
+    page.keyboard.press("Shift+ArrowRight")
+    assert int(plot.get_attribute("data-from")) > inner
+    page.keyboard.press("0")
+    assert plot.get_attribute("data-to") == "50000"
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("ArrowRight")
+    assert "27,000 episodes" in page.locator(".readout").first.text_content()
+    page.locator(".legend input").first.uncheck()
+    assert plot.locator(".mean").count() == 3
+
+
+@pytest.mark.parametrize("study", ["case", "tiny"])
+def test_a_phone_shows_it_without_scrolling_sideways(opened: Open, finished: Path, study: str, report: Path):
+    path = report if study == "case" else finished / "report.html"
+    page = opened(path, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
+    page.locator("[data-do=forth]").tap()
+    assert told(page, "tick") == 1
+    assert page.evaluate("document.documentElement.scrollWidth") == 360
+    for button in page.locator(".transport button").all():
+        box = button.bounding_box()
+        assert min(box["width"], box["height"]) >= 40
+        assert box["x"] + box["width"] <= 360
+    assert page.locator(".map").bounding_box()["width"] > 280
+
+
+def contrast(page: Any, selector: str) -> float:
+    """WCAG's contrast of an element's text with the background behind it."""
+    return page.locator(selector).first.evaluate(
+        """element => {
+          const parse = (text) => text.match(/[\\d.]+/g).map(Number);
+          const light = ([r, g, b]) => [r, g, b].map((c) => c / 255)
+            .map((c) => (c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4))
+            .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
+          let behind = element;
+          const clear = (each) => (parse(getComputedStyle(each).backgroundColor)[3] ?? 1) === 0;
+          while (clear(behind)) behind = behind.parentElement;
+          const pair = [getComputedStyle(element).color, getComputedStyle(behind).backgroundColor];
+          const [low, high] = pair.map((text) => light(parse(text))).sort((a, b) => a - b);
+          return (high + 0.05) / (low + 0.05);
+        }"""
+    )
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_text_can_be_read_in_light_and_in_dark(opened: Open, scheme: str):
+    page = opened(color_scheme=scheme)
+    light = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    assert light == (scheme == "light")
+    for selector in (".said", ".lane-text", ".lane-text .note", ".sign", ".clock", ".readout .note", ".tick", "button"):
+        assert contrast(page, selector) >= 4.5, selector
+
+
+def test_on_paper_the_state_is_there_without_the_controls(opened: Open):
+    page = opened()
+    page.locator("[data-do=last]").click()
+    page.emulate_media(media="print")
+    for hidden in (".choices", ".controls", ".keys", ".live-curves", "nav"):
+        assert not page.locator(hidden).first.is_visible(), hidden
+    for shown in (".map", ".automaton", ".lane", "#curves .picture", ".on-paper"):
+        assert page.locator(shown).first.is_visible(), shown
+    assert page.locator(".on-paper").text_content().startswith("III: extended states of φᵀ; run 1, after 1,000 learned")
+    assert len(page.pdf()) > 10_000
+
+
+def test_motion_is_left_out_where_it_is_not_wanted(opened: Open):
+    page = opened(reduced_motion="reduce")
+    assert page.locator(".robot").evaluate("x => getComputedStyle(x).transitionDuration") == "0s"
+    page = opened()
+    assert page.locator(".robot").evaluate("x => getComputedStyle(x).transitionDuration") != "0s"
+
+
+def test_without_scripts_the_page_says_so_and_shows_the_figures(browser: Any, report: Path):
+    context = browser.new_context(java_script_enabled=False)
+    page = context.new_page()
+    page.goto(report.as_uri())
+    assert page.get_by_text("Playing needs JavaScript").is_visible()
+    assert page.locator("#curves .picture").is_visible()
+    assert not page.locator(".player").is_visible()
+    context.close()
+
+
+def test_old_recordings_are_missed_in_words(opened: Open, tmp_path: Path):
+    path = tmp_path / "old.html"
+    path.write_text(render_report(synthetic.results(SPEC), SPEC, {}), encoding="utf-8")
+    page = opened(path)
+    assert page.get_by_text("There is nothing to play").is_visible()
+    assert page.locator(".player").count() == 0
+
+
+def test_a_run_without_a_formula_plays_the_world_alone(opened: Open, tmp_path: Path):
+    path = tmp_path / "plain.html"
+    path.write_text(render_report(recorded.results(SPEC, formula=None), SPEC, {}), encoding="utf-8")
+    page = opened(path)
+    choose(page, method="I")
+    assert page.get_by_text("No formula was inferred, so there is no automaton.").is_visible()
+    assert len(watch(page)) >= 39
