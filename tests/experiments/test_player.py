@@ -268,7 +268,7 @@ def test_keys_do_all_that_buttons_do(opened: Open):
         assert select.input_value() == first
     page.locator(".keys summary").click()
     named = page.locator(".keys kbd").all_text_contents()
-    assert {"Space", "←", "→", "Home", "End", "-", "+", ",", ".", "[", "]", "m", "r"} == set(named)
+    assert {"Space", "←", "→", "↑", "Home", "End", "-", "+", ",", ".", "[", "]", "m", "r", "Enter", "Esc"} == set(named)
 
 
 def test_the_focus_is_seen_and_controls_have_names(opened: Open):
@@ -279,9 +279,7 @@ def test_the_focus_is_seen_and_controls_have_names(opened: Open):
         outline = page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
         assert outline != "none", page.evaluate("document.activeElement.outerHTML.slice(0, 200)")
     for control in page.locator(".player button, .player select, .player input").all():
-        assert control.evaluate(
-            "x => x.getAttribute('aria-label') || (x.labels.length && x.labels[0].textContent.trim())"
-        )
+        assert control.evaluate("x => x.getAttribute('aria-label') || (x.labels[0] || x).textContent.trim()")
     assert page.locator(".player").get_attribute("role") == "group"
     assert page.locator("[data-choose=tick]").get_attribute("aria-valuetext") == "tick 0 of 40"
 
@@ -429,3 +427,39 @@ def test_a_run_without_a_formula_plays_the_world_alone(opened: Open, tmp_path: P
     choose(page, method="I")
     assert page.get_by_text("No formula was inferred, so there is no automaton.").is_visible()
     assert len(watch(page)) >= 39
+
+
+def test_a_reader_can_drive_the_robot(opened: Open):
+    page = opened()
+    choose(page, method="III")
+    page.evaluate("() => { window.chances = []; Math.random = () => window.chances.shift(); }")
+    mdp = SPEC.target.mdp()
+    start = page.locator(".map > title").text_content()
+    page.get_by_role("button", name="Drive it yourself").click()
+    assert page.locator(".map > title").text_content() == start
+    assert page.locator("[data-choose=method]").is_disabled()
+    place = re.search(r"cell \((\d), (\d)\), facing (\w+)", start)
+    state = SPEC.target.world.state(int(place[1]), int(place[2]), HEADINGS.index(place[3]))
+    # (key, action, the number drawn, the outcome by the world's table: forward, left, right; turned, not turned)
+    script = [
+        ("ArrowUp", 0, 0.5, 0), ("ArrowUp", 0, 0.01, 1), ("ArrowUp", 0, 0.05, 2), ("ArrowLeft", 1, 0.5, 0),
+        ("ArrowLeft", 1, 0.02, 1), ("ArrowRight", 2, 0.5, 0), ("ArrowRight", 2, 0.01, 1), ("ArrowUp", 0, 0.99, 0),
+    ]  # fmt: skip
+    states = [state]
+    for tick, (key, action, chance, outcome) in enumerate(script * 5, start=1):
+        page.evaluate("chance => { window.chances.push(chance); }", chance)
+        page.keyboard.press(key)
+        state = int(mdp.successor[state, action, outcome])
+        states.append(state)
+        i, j, heading = SPEC.target.world.place(state)
+        assert f"cell ({i}, {j}), facing {HEADINGS[heading]}" in page.locator(".map > title").text_content()
+        assert told(page, "tick") == tick
+    page.keyboard.press("ArrowUp")  # past the deadline nothing moves
+    assert told(page, "tick") == 40
+    automata = timed_automata(parse(recorded.EVERY_OPERATOR))
+    path = mdp.coordinates[states]
+    last = [run(automaton, path, variables=mdp.variables).steps[-1] for automaton in automata]
+    assert told(page, "locations") == [step.target for step in last]
+    page.keyboard.press("Escape")
+    assert page.get_by_role("button", name="Drive it yourself").is_visible()
+    assert page.locator("[data-choose=method]").is_enabled()

@@ -17,7 +17,7 @@ from markupsafe import Markup
 
 from tickwise.experiments.verdict import count
 
-_SCRIPTS = ("elements.js", "automaton.js", "world.js", "timeline.js", "player.js", "curves.js")
+_SCRIPTS = ("elements.js", "automaton.js", "world.js", "timeline.js", "drive.js", "player.js", "curves.js")
 """The scripts in their order: later ones use earlier ones."""
 
 

@@ -68,6 +68,8 @@ def _task(environment: EnvironmentSpec, table: TaskTable, task: str) -> dict[str
     size = environment.world.size
     return {
         "size": size,
+        "slip": environment.world.slip,
+        "turnFailure": environment.world.turn_failure,
         "deadline": environment.task.deadline,
         "stages": table.stages,
         "landmarks": [
@@ -127,6 +129,7 @@ def _formula(results: Mapping[str, Any], spec: StudySpec, key: str) -> dict[str,
     boxes = list(formula.names)
     return {
         "symbol": formula.symbol,
+        "english": to_english(formula.sdnf, {box: name.plain for box, name in formula.names.items()}),
         "regions": [_region(box, formula, environment) for box in boxes],
         "automata": [_automaton(automaton, formula, boxes) for automaton in timed_automata(formula.sdnf)],
     }

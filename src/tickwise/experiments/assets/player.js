@@ -17,6 +17,7 @@ class Player {
     root.previousElementSibling.remove(); // it says that there is no player
     root.hidden = false;
     root.tabIndex = 0;
+    this.drive = new Drive(this);
     this.listen();
     this.load();
   }
@@ -58,7 +59,7 @@ class Player {
   press(event, actions) {
     if (event.ctrlKey || event.metaKey || event.altKey || event.target.tagName === "SELECT") return;
     const pressable = ["BUTTON", "SUMMARY"].includes(event.target.tagName) || event.target.type === "checkbox";
-    if (event.key === " " && pressable) return; // there it presses what has the focus
+    if ([" ", "Enter"].includes(event.key) && pressable) return; // there it presses what has the focus
     const cycle = (name, by, count) => () => this.choose(name, (this.chosen[name] + by + count) % count);
     const keys = {
       " ": actions.play,
@@ -76,7 +77,7 @@ class Player {
       m: cycle("method", 1, this.data.methods.length),
       r: cycle("run", 1, this.method.runs.length),
     };
-    const action = keys[event.key];
+    const action = this.drive.episode ? this.drive.keys[event.key] : keys[event.key];
     if (!action) return;
     event.preventDefault();
     action();
@@ -100,7 +101,7 @@ class Player {
     this.chosen.point = clamp(this.chosen.point, 0, this.points.length - 1);
     this.point = this.points[this.chosen.point];
     this.chosen.episode = clamp(this.chosen.episode, 0, this.point.episodes.length - 1);
-    this.episode = this.point.episodes[this.chosen.episode];
+    this.episode = this.drive.episode || this.point.episodes[this.chosen.episode];
     this.task = this.data.tasks[this.method.task];
     this.formula = this.method.formula && this.data.formulas[this.method.formula];
     this.offer("method", this.data.methods.map(({ title }) => title));
@@ -115,11 +116,20 @@ class Player {
     this.world.load(this.episode.states);
     this.find("show", "world").replaceChildren(this.world.element);
     this.readFormula();
-    this.find("show", "outcome").textContent = this.outcome();
+    this.find("show", "outcome").textContent = this.drive.episode ? this.drive.outcome() : this.outcome();
+    this.drive.show();
     const { title, runs } = this.method;
     const run = `run ${runs[this.chosen.run].run}, after ${numberText(this.point.learned)} learned episodes`;
     this.find("show", "episode").textContent = `${title}; ${run}, episode ${this.chosen.episode + 1}.`;
     this.go(0);
+  }
+
+  /** Take up what was added to the end of the episode. */
+  extend() {
+    this.find("choose", "tick").max = this.last;
+    this.world.extend(this.episode.states);
+    this.readFormula();
+    this.go(this.last);
   }
 
   offer(name, options) {
@@ -249,7 +259,7 @@ class Player {
     const [before, now] = [this.tick - 1, this.tick].map((at) => placeOf(this.episode.states[at], this.task.size));
     const action = this.episode.actions[this.tick - 1];
     const [dx, dy] = [now.i - before.i, now.j - before.j];
-    const [x, y] = [[1, 0], [0, 1], [-1, 0], [0, -1]][before.heading];
+    const [x, y] = STEPS[before.heading];
     const [ahead, side] = [dx * x + dy * y, dy * x - dx * y];
     let how = "";
     if (action === 0 && side) how = `, and slipped to the ${side > 0 ? "left" : "right"}`;
@@ -260,9 +270,10 @@ class Player {
 
   now() {
     const { tick, episode, task } = this;
-    const sum = episode.rewards.slice(0, tick + 1).reduce((total, reward) => total + reward, 0);
     const verdict = Math.max(-1, ...this.views.map(({ automaton, run }) => outcomeOf(automaton, run[tick].location)));
     const says = this.views.length ? `${this.formula.symbol} is ${verdict ? VERDICTS[verdict].word : "not decided yet"}. ` : "";
+    if (this.drive.episode) return `Tick ${tick}: ${says}`;
+    const sum = episode.rewards.slice(0, tick + 1).reduce((total, reward) => total + reward, 0);
     return `Tick ${tick}: ${says}Hidden task: ${task.stages[episode.stages[tick]]}. Return so far: ${numberText(sum, 1)}.`;
   }
 }

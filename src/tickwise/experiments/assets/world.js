@@ -75,12 +75,16 @@ class WorldView {
 
   /** Take up an episode: its whole way is drawn faintly. */
   load(states) {
-    this.path = states.map((state) => placeOf(state, this.size));
-    this.ghost.setAttribute("points", this.points(this.path));
+    this.extend(states);
     const [first] = this.path;
     this.begin.setAttribute("cx", this.x(first.i + 0.5));
     this.begin.setAttribute("cy", this.y(first.j + 0.5));
     this.turned = null;
+  }
+
+  extend(states) {
+    this.path = states.map((state) => placeOf(state, this.size));
+    this.ghost.setAttribute("points", this.points(this.path));
   }
 
   points(path) {
