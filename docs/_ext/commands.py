@@ -1,0 +1,58 @@
+"""The directive ``command-line``: every command of an application, with its arguments and options, from the code."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from typing import Any
+
+import typer
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
+from tables import table
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the directive."""
+    app.add_directive("command-line", CommandLine)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+class CommandLine(SphinxDirective):
+    """A section for each command of a typer application, given as ``module:name``."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """The sections, in the order of the help."""
+        module, name = self.arguments[0].split(":")
+        self.env.note_dependency(str(import_module(module).__file__))
+        group: Any = typer.main.get_command(getattr(import_module(module), name))
+        return [self._section(group.name, command) for command in group.commands.values()]
+
+    def _section(self, program: str, command: Any) -> nodes.section:
+        title = f"{program} {command.name}"
+        section = nodes.section(ids=[nodes.make_id(title)], names=[nodes.fully_normalize_name(title)])
+        self.state.document.note_explicit_target(section)
+        section += nodes.title("", "", nodes.literal(title, title))
+        what, *examples = re.split(r"\bFor example: ", re.sub(r"\s+", " ", command.help or ""))
+        section += nodes.paragraph("", what.strip())
+        context = command.make_context(command.name, [], resilient_parsing=True)
+        usage = " ".join((title, *command.collect_usage_pieces(context)))
+        lines = [usage, *(f"\n# for example\n{example}" for example in examples)]
+        section += nodes.literal_block("", "\n".join(lines), language="sh")
+        for kind, heading in (("argument", "Argument"), ("option", "Option")):
+            records = [each.get_help_record(context) for each in command.params if each.param_type_name == kind]
+            rows = [self._row(*record) for record in records if record is not None]
+            if rows:
+                section += table((heading, "What it says", "Otherwise"), rows, (26, 54, 20))
+        return section
+
+    @staticmethod
+    def _row(form: str, text: str) -> tuple[nodes.Node, ...]:
+        """The form, the meaning, and the default with the limits, which a help text has in brackets at its end."""
+        found = re.fullmatch(r"(.*?)(?:  \[(.*)\])?", text, flags=re.DOTALL)
+        assert found is not None
+        otherwise = (found.group(2) or "").replace("default: ", "").replace("; ", ", ").replace("x>=", "at least ")
+        return nodes.literal(form, form), nodes.Text(found.group(1)), nodes.Text(otherwise)
