@@ -17,7 +17,9 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 
 def _process(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    del app, what, name, obj, options
+    del app, name, obj, options
+    if what in ("data", "attribute", "property") and lines:
+        lines.insert(0, "")  # a first line "what: which" is a sentence, and no type with a description
     if any(_kind(line) for line in lines):
         lines[:] = restructured(lines)
 

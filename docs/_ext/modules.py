@@ -11,10 +11,11 @@ from typing import Any
 from docutils import nodes
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
+from sphinx.domains.python import PyObject
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.inspect import stringify_signature
-from sources import path_of, places, public_modules
+from sources import imported, path_of, places, public_modules
 
 LOGGER = logging.getLogger(__name__)
 LEFT_OUT = ("tickwise.cli", "tickwise.__main__")
@@ -25,6 +26,9 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives, and show types as the source has them."""
     app.add_directive("package", Package)
     app.add_directive("facade", Facade)
+    for field in PyObject.doc_field_types:
+        if field.name == "variable":
+            field.label = "Attributes"
     app.connect("autodoc-process-signature", _signature_of_the_source)
     app.connect("autodoc-skip-member", _skip_what_dataclasses_add)
     app.connect("env-check-consistency", _warn_of_missing_modules)
@@ -93,7 +97,7 @@ def _signature_of_the_source(
         return None
     if what == "method" and next(iter(found.parameters), "") in ("self", "cls"):
         found = found.replace(parameters=list(found.parameters.values())[1:])
-    known = vars(sys.modules[obj.__module__])
+    known = {**imported(obj.__module__), **vars(sys.modules[obj.__module__])}
     parameters = [each.replace(annotation=_full(each.annotation, known)) for each in found.parameters.values()]
     text = stringify_signature(found.replace(parameters=parameters), show_return_annotation=False)
     returned = _full(found.return_annotation, known)
@@ -109,7 +113,10 @@ def _full(annotation: Any, known: dict[str, Any]) -> Any:
 
 
 def _home(name: str, known: dict[str, Any]) -> str:
+    """The full name; a text among what is known is one that only a type checker imports."""
     value = known.get(name)
+    if isinstance(value, str):
+        return value
     home = getattr(value, "__module__", None) if inspect.isclass(value) else None
     if value is None or (home is not None and not home.startswith("tickwise")):
         return name

@@ -73,6 +73,16 @@ def places(module: str) -> dict[str, Place]:
     return {name: Place(module, name, line) for name, line, _ in _named(_tree(module))}
 
 
+def imported(module: str) -> dict[str, str]:
+    """The full names of what a module imports from tickwise, also where only a type checker does."""
+    return {
+        alias.asname or alias.name: f"{node.module}.{alias.name}"
+        for node in ast.walk(_tree(module))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("tickwise")
+        for alias in node.names
+    }
+
+
 def _named(tree: ast.Module | ast.ClassDef, prefix: str = "") -> Iterator[tuple[str, int, ast.stmt]]:
     for node in tree.body:
         if isinstance(node, _Definition):

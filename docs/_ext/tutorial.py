@@ -1,0 +1,122 @@
+"""Run the tutorial: what its blocks print has to be what it shows.
+
+``python docs/_ext/tutorial.py`` writes the outputs into the page, and the figure that it draws into ``docs/images``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shlex
+import shutil
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from tickwise.cli import main
+
+DOCS = Path(__file__).parents[1]
+PAGE = DOCS / "tutorial.md"
+FIGURE = "curves.svg"
+"""The file that the tutorial's last block writes."""
+
+_FENCE = re.compile(r"^```(?P<kind>python|console|text)\n(?P<body>.*?)^```$", flags=re.MULTILINE | re.DOTALL)
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A block of code, or a command, and what it prints.
+
+    Attributes:
+        line: The line of the page, from 1.
+        kind: ``python``, or ``console`` for a command.
+        source: The code, or the command without the prompt.
+        shown: What the page says that it prints.
+        span: Where that is in the page's text; None where there is no place for it.
+    """
+
+    line: int
+    kind: str
+    source: str
+    shown: str
+    span: tuple[int, int] | None
+
+
+def steps(page: str) -> list[Step]:
+    """The steps of a page, in order: a ``python`` block prints the ``text`` block after it, a command what follows it.
+
+    Raises:
+        ValueError: If a ``text`` block does not follow a ``python`` block.
+    """
+    found: list[Step] = []
+    for match in _FENCE.finditer(page):
+        kind, body, start = match["kind"], match["body"], match.start("body")
+        line = page.count("\n", 0, start) + 1
+        if kind == "python":
+            found.append(Step(line, kind, body, "", None))
+        elif kind == "console":
+            found += _commands(body, start, line)
+        elif not found or found[-1].kind != "python" or found[-1].span:
+            raise ValueError(f"line {line}: a text block without a python block before it")
+        else:
+            last = found.pop()
+            found.append(Step(last.line, last.kind, last.source, body, (start, match.end("body"))))
+    return found
+
+
+def _commands(body: str, start: int, line: int) -> Iterator[Step]:
+    for match in re.finditer(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", body, flags=re.MULTILINE):
+        span = (start + match.start(2), start + match.end(2))
+        yield Step(line + body.count("\n", 0, match.start()), "console", match[1], match[2], span)
+
+
+def run(step: Step, names: dict[str, object]) -> str:
+    """What a step prints, in the current folder.
+
+    Args:
+        step: The step.
+        names: The names that Python blocks share; new ones are added.
+
+    Returns:
+        The output, without spaces at the ends of lines; tabs are one space.
+
+    Raises:
+        ValueError: If the command is not ``tickwise`` or fails.
+    """
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        if step.kind == "python":
+            exec(compile("\n" * (step.line - 1) + step.source, str(PAGE), "exec"), names)
+        else:
+            program, *arguments = shlex.split(step.source)
+            if program != "tickwise" or main(arguments) != 0:
+                raise ValueError(f"line {step.line}: {step.source} is no command that succeeds")
+    return "".join(f"{line.rstrip()}\n" for line in printed.getvalue().replace("\t", " ").splitlines())
+
+
+def same(printed: str, shown: str) -> bool:
+    """Whether two outputs agree but for times, such as ``0.3 s``."""
+    times = re.compile(r"\d+\.\d s\b")
+    return times.sub("… s", printed) == times.sub("… s", shown)
+
+
+def rewrite() -> None:
+    """Write what the steps print into the page, and keep the figure."""
+    page, names = PAGE.read_text(encoding="utf-8"), dict[str, object]()
+    found = steps(page)
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        outputs = [run(step, names) for step in found]
+        shutil.copy(FIGURE, DOCS / "images" / "tutorial-curves.svg")
+    for step, output in reversed(list(zip(found, outputs, strict=True))):
+        if same(output, step.shown):
+            continue
+        if step.span is None:
+            raise ValueError(f"line {step.line}: this block prints something; put a text block after it")
+        page = page[: step.span[0]] + output + page[step.span[1] :]
+    PAGE.write_text(page, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    rewrite()
