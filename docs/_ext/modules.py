@@ -32,7 +32,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
     app.connect("autodoc-process-signature", _signature_of_the_source)
     app.connect("autodoc-skip-member", _skip_what_dataclasses_add)
     app.connect("env-check-consistency", _warn_of_missing_modules)
-    return {"parallel_read_safe": False, "parallel_write_safe": True}
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 class Package(SphinxDirective):
@@ -43,7 +43,7 @@ class Package(SphinxDirective):
     def run(self) -> list[nodes.Node]:
         """The sections, by the modules' names."""
         name = self.arguments[0]
-        modules = public_modules(name) if path_of(name).name == "__init__.py" else [name]
+        modules = public_modules(name) if path_of(name).name == "__init__.py" else (name,)
         documented = self.env.metadata[self.env.docname].setdefault("modules", "")
         self.env.metadata[self.env.docname]["modules"] = " ".join((documented, *modules)).strip()
         lines = []
@@ -91,6 +91,8 @@ def _signature_of_the_source(
     del app, name, options, returns
     if what not in ("function", "method", "class") or signature is None:
         return None
+    if not str(getattr(obj, "__module__", "")).startswith("tickwise."):
+        return None  # what a module only imports is asked for too, and then left out
     try:
         found = inspect.signature(obj)
     except (TypeError, ValueError):
@@ -120,7 +122,7 @@ def _home(name: str, known: dict[str, Any]) -> str:
     home = getattr(value, "__module__", None) if inspect.isclass(value) else None
     if value is None or (home is not None and not home.startswith("tickwise")):
         return name
-    homes = [home] if home else [module for module in public_modules("tickwise") if name in places(module)]
+    homes = (home,) if home else tuple(module for module in public_modules("tickwise") if name in places(module))
     return next((f"{module}.{name}" for module in homes if _has(module, name, value)), name)
 
 

@@ -55,7 +55,8 @@ def path_of(module: str) -> Path:
     raise FileNotFoundError(f"there is no module {module}")
 
 
-def public_modules(package: str) -> list[str]:
+@cache
+def public_modules(package: str) -> tuple[str, ...]:
     """The modules of a package and of those below it, without private ones, in alphabetical order."""
     folder = path_of(package).parent
     found = []
@@ -64,7 +65,7 @@ def public_modules(package: str) -> list[str]:
         parts = parts[:-1] if parts[-1] == "__init__" else parts
         if not any(part.startswith("_") for part in parts):
             found.append(".".join(parts))
-    return sorted(found)
+    return tuple(sorted(found))
 
 
 @cache
@@ -73,6 +74,7 @@ def places(module: str) -> dict[str, Place]:
     return {name: Place(module, name, line) for name, line, _ in _named(_tree(module))}
 
 
+@cache
 def imported(module: str) -> dict[str, str]:
     """The full names of what a module imports from tickwise, also where only a type checker does."""
     return {

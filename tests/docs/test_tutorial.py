@@ -1,30 +1,28 @@
-"""The tutorial prints what it says that it prints."""
+"""The blocks of pages print what the pages say that they print."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import pages
 import pytest
-import tutorial
 
 
-@pytest.fixture(scope="module")
-def page() -> str:
-    return tutorial.PAGE.read_text(encoding="utf-8")
-
-
-def test_every_output_is_as_shown(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+@pytest.mark.parametrize("name", pages.PAGES)
+def test_every_output_is_as_shown(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("MPLBACKEND", "agg")
-    names: dict[str, object] = {}
-    for step in tutorial.steps(page):
-        printed = tutorial.run(step, names)
-        assert tutorial.same(printed, step.shown), f"line {step.line} prints\n{printed}\nand not\n{step.shown}"
-    assert (tmp_path / tutorial.FIGURE).stat().st_size > 0
+    page = (pages.DOCS / f"{name}.md").read_text(encoding="utf-8")
+    names = pages.names_for(page)
+    for step in pages.steps(page):
+        printed = pages.run(step, names)
+        assert pages.same(printed, step.shown), f"line {step.line} prints\n{printed}\nand not\n{step.shown}"
+    if name == "tutorial":
+        assert all((tmp_path / figure).stat().st_size for figure in pages.FIGURES)
 
 
-def test_there_are_commands_and_code(page: str):
-    kinds = [step.kind for step in tutorial.steps(page)]
+def test_the_tutorial_has_commands_and_code():
+    kinds = [step.kind for step in pages.steps((pages.DOCS / "tutorial.md").read_text(encoding="utf-8"))]
     assert kinds.count("console") >= 3
     assert kinds.count("python") >= 10
 
@@ -48,7 +46,7 @@ $ tickwise --version
 
 
 def test_a_page_becomes_steps():
-    code, first, second = tutorial.steps(TEXT)
+    code, first, second = pages.steps(TEXT)
     assert (code.line, code.kind, code.source, code.shown) == (3, "python", "print(1)\n", "1\n")
     assert (first.kind, first.source) == ("console", "tickwise compare 'F[0,9] (x > 1)' 'F[3,5] (y < 2)'")
     assert (first.line, first.shown) == (11, "first\nsecond\n")
@@ -58,15 +56,15 @@ def test_a_page_becomes_steps():
 
 def test_an_output_belongs_to_code():
     with pytest.raises(ValueError, match="line 2: a text block without a python block"):
-        tutorial.steps("```text\n1\n```\n")
+        pages.steps("```text\n1\n```\n")
 
 
 def test_times_may_differ_and_nothing_else():
-    assert tutorial.same("rate 1.0, 0.9 s\n", "rate 1.0, 12.1 s\n")
-    assert not tutorial.same("rate 1.0, 0.9 s\n", "rate 1.1, 0.9 s\n")
+    assert pages.same("rate 1.0, 0.9 s\n", "rate 1.0, 12.1 s\n")
+    assert not pages.same("rate 1.0, 0.9 s\n", "rate 1.1, 0.9 s\n")
 
 
 def test_a_command_that_fails_is_told():
-    (step,) = tutorial.steps("```console\n$ tickwise check 'F[0,9]' nowhere.csv\n```\n")
+    (step,) = pages.steps("```console\n$ tickwise check 'F[0,9]' nowhere.csv\n```\n")
     with pytest.raises(ValueError, match="line 2: .* is no command that succeeds"):
-        tutorial.run(step, {})
+        pages.run(step, {})

@@ -1,6 +1,6 @@
-"""Run the tutorial: what its blocks print has to be what it shows.
+"""Run the blocks of pages: what they print has to be what the pages show.
 
-``python docs/_ext/tutorial.py`` writes the outputs into the page, and the figure that it draws into ``docs/images``.
+``python docs/_ext/pages.py`` writes the outputs into the pages, and the tutorial's figure into ``docs/images``.
 """
 
 from __future__ import annotations
@@ -18,9 +18,11 @@ from pathlib import Path
 from tickwise.cli import main
 
 DOCS = Path(__file__).parents[1]
-PAGE = DOCS / "tutorial.md"
-FIGURE = "curves.svg"
-"""The file that the tutorial's last block writes."""
+PAGES = ("tutorial", "concepts", "how-to/add-a-case-study", "how-to/many-seeds")
+"""The pages whose blocks are run, each in a folder of its own."""
+
+FIGURES = {"curves.svg": "tutorial-curves.svg"}
+"""What blocks write that pages show, and its name in ``docs/images``."""
 
 _FENCE = re.compile(r"^```(?P<kind>python|console|text)\n(?P<body>.*?)^```$", flags=re.MULTILINE | re.DOTALL)
 
@@ -88,7 +90,7 @@ def run(step: Step, names: dict[str, object]) -> str:
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         if step.kind == "python":
-            exec(compile("\n" * (step.line - 1) + step.source, str(PAGE), "exec"), names)
+            exec(compile("\n" * (step.line - 1) + step.source, "<page>", "exec"), names)
         else:
             program, *arguments = shlex.split(step.source)
             if program != "tickwise" or main(arguments) != 0:
@@ -102,21 +104,33 @@ def same(printed: str, shown: str) -> bool:
     return times.sub("… s", printed) == times.sub("… s", shown)
 
 
-def rewrite() -> None:
-    """Write what the steps print into the page, and keep the figure."""
-    page, names = PAGE.read_text(encoding="utf-8"), dict[str, object]()
-    found = steps(page)
+def names_for(page: str) -> dict[str, object]:
+    """The names that a page's first block may use: what the page includes from CONTRIBUTING.md is run before."""
+    names: dict[str, object] = {}
+    if "CONTRIBUTING.md" in page:
+        text = (DOCS.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+        run(steps(text[text.index("## Adding a case study") :])[0], names)
+    return names
+
+
+def rewrite(path: Path) -> None:
+    """Write what the steps of a page print into it, and keep its figures."""
+    page = path.read_text(encoding="utf-8")
+    names, found = names_for(page), steps(page)
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         outputs = [run(step, names) for step in found]
-        shutil.copy(FIGURE, DOCS / "images" / "tutorial-curves.svg")
+        for name, kept in FIGURES.items():
+            if Path(name).exists():
+                shutil.copy(name, DOCS / "images" / kept)
     for step, output in reversed(list(zip(found, outputs, strict=True))):
         if same(output, step.shown):
             continue
         if step.span is None:
-            raise ValueError(f"line {step.line}: this block prints something; put a text block after it")
+            raise ValueError(f"{path.name}, line {step.line}: this block prints something; put a text block after it")
         page = page[: step.span[0]] + output + page[step.span[1] :]
-    PAGE.write_text(page, encoding="utf-8")
+    path.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    rewrite()
+    for each in PAGES:
+        rewrite(DOCS / f"{each}.md")
