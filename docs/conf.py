@@ -39,7 +39,7 @@ myst_heading_anchors = 3
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-autodoc_default_options = {"members": True, "no-value": True}
+autodoc_default_options = {"members": True, "no-value": True, "ignore-module-all": True}
 autodoc_class_signature = "mixed"
 add_module_names = False
 maximum_signature_line_length = 90
@@ -48,6 +48,8 @@ napoleon_numpy_docstring = False
 napoleon_use_ivar = True
 napoleon_attr_annotations = False
 napoleon_use_rtype = False
+# only what a module defines itself is documented, so nothing is to be followed
+viewcode_follow_imported_members = False
 toc_object_entries_show_parents = "hide"
 
 html_theme = "furo"

@@ -54,5 +54,7 @@ def _table(lines: list[str]) -> Iterator[str]:
     for line in lines:
         cells = [cell.strip() for cell in line.strip("| ").split("|")]
         if not all(re.fullmatch(":?-+:?", cell) for cell in cells):
-            yield from (f"   {'-' if number else '* -'} {cell}".replace("   -", "     -") for number, cell in enumerate(cells))
+            yield from (
+                f"   {'-' if number else '* -'} {cell}".replace("   -", "     -") for number, cell in enumerate(cells)
+            )
     yield ""

@@ -48,7 +48,7 @@ class Package(SphinxDirective):
         self.env.metadata[self.env.docname]["modules"] = " ".join((documented, *modules)).strip()
         lines = []
         for module in modules:
-            if places(module):  # a package's own file may have nothing but its description
+            if set(places(module)) - {"__all__"}:  # a package's own file may have nothing but a description
                 title = module.removeprefix("tickwise.")
                 lines += [f"## `{title}`", "", "```{eval-rst}", f".. automodule:: {module}", "```", ""]
         return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)

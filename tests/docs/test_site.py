@@ -16,6 +16,8 @@ pytest.importorskip("sphinx", reason="Sphinx is not installed; the documentation
 pytest.importorskip("furo", reason="Furo, the documentation's theme, is not installed")
 pytest.importorskip("myst_parser", reason="MyST, which reads the documentation's Markdown, is not installed")
 
+pytestmark = pytest.mark.slow  # a build takes half a minute
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -52,7 +54,9 @@ class _Page(HTMLParser):
             self.links.append(values["href"])
         elif tag == "link" and values.get("rel") in ("stylesheet", "icon", "preload", "preconnect", "manifest"):
             self.parts.append(values["href"])
-        elif tag in ("img", "script", "source", "iframe", "object") and (found := values.get("src", values.get("data"))):
+        elif tag in ("img", "script", "source", "iframe", "object") and (
+            found := values.get("src", values.get("data"))
+        ):
             self.parts.append(found)
         if tag == "img" and not values.get("alt"):
             self.images_without_text.append(values["src"])

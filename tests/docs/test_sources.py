@@ -48,7 +48,9 @@ def test_names_have_their_lines(module: str):
 
 
 def test_citations_have_their_places(module: str):
-    found = {(each.item, tuple(sorted(each.lines)), each.place.name, each.place.line) for each in sources.citations(module)}
+    found = {
+        (each.item, tuple(sorted(each.lines)), each.place.name, each.place.line) for each in sources.citations(module)
+    }
     assert found == {
         ("Algorithm 2", (), "", 1),
         ("Definition 2", (), "Reader", 6),
