@@ -15,7 +15,7 @@ os.environ["NUMBA_DISABLE_JIT"] = "1"
 
 project = "Tickwise"
 author = "The Tickwise developers"
-copyright = "the Tickwise developers"  # noqa: A001 (Sphinx's name)
+copyright = "the Tickwise developers"
 
 extensions = [
     "myst_parser",

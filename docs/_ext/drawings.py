@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
+
 from tickwise.automata.build import timed_automata
 from tickwise.automata.run import letters_of
 from tickwise.envs.gridworld import GridWorld
@@ -39,8 +40,10 @@ FORMULA = "F[1,15] G[0,4] (3 <= x <= 4 & 3 <= y <= 5) & F[21,39] (7 <= x <= 8 & 
 
 
 def ticks() -> str:
-    """A trajectory of 41 ticks: where it is in G and in Y, both windows, and at each tick the verdict on what was
-    seen so far, the location of the automaton, and its clock within the stay.
+    """Draw what happens at each tick of a trajectory.
+
+    Rows of 41 ticks: the windows of both regions, the ticks in them, and the verdict, the location of the automaton and
+    its clock within the stay after each tick.
     """
     trajectory = np.full((41, 2), 1.5)
     trajectory[4:6] = trajectory[9:16] = 3.5, 4.5
@@ -66,10 +69,11 @@ class _TickRows:
         self.letters = letters
 
     def draw(self) -> None:
+        """Draw all rows."""
         for tick in range(0, 41, 5):
             x = self.left + (tick + 0.5) * self.cell
             self.axes.text(x, self.top + 0.2, str(tick), ha="center", va="center", color=MUTED, fontsize=9)
-        self._name(0, "window of G", "when a stay may begin")
+        self._name(0, "window of G")
         self._span(0, 1, 15, GREEN)
         self._span(0, 16, 19, GREEN, faint=True)
         self._name(1, "window of Y")
@@ -88,8 +92,7 @@ class _TickRows:
     def _y(self, row: int) -> float:
         return self.top - 0.42 * row - 0.15
 
-    def _name(self, row: int, text: str, below: str = "") -> None:
-        del below
+    def _name(self, row: int, text: str) -> None:
         self.axes.text(self.left - 0.12, self._y(row), text, ha="right", va="center", fontsize=9.5)
 
     def _span(self, row: int, first: int, last: int, colour: str, *, faint: bool = False) -> None:
@@ -104,8 +107,10 @@ class _TickRows:
 
 
 def similar() -> str:
-    """Two gridworlds: a state of the target at some place relative to its region G, and the state of the source that
-    lies alike relative to the source's region; where that would be outside the world, the nearest one within it.
+    """Draw which places of two gridworlds are likened to each other.
+
+    Two gridworlds with a region each: four places about the target's region, and those of the source that lie in the
+    same direction and at the same distance from its own.
     """
     mdp = GridWorld(9).mdp()
     centres = [box.centroid(mdp.variables, mdp.limits) for box in (SOURCE, TARGET)]

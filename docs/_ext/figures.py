@@ -51,7 +51,7 @@ class Automaton(_Picture):
 
 
 class Drawing(_Picture):
-    """A drawing of the module beside this one, by the name of its function; its docstring stands for the picture."""
+    """A drawing of the module beside this one, by the name of its function; what its docstring describes stands for the picture."""
 
     def run(self) -> list[nodes.Node]:
         """The figure."""
@@ -61,4 +61,4 @@ class Drawing(_Picture):
         draw = getattr(drawings, self.arguments[0], None)
         if draw is None or self.arguments[0] not in drawings.__all__:
             raise self.error(f"there is no drawing {self.arguments[0]!r}; use {', '.join(drawings.__all__)}")
-        return self.picture(self.arguments[0], draw(), " ".join(draw.__doc__.split()))
+        return self.picture(self.arguments[0], draw(), " ".join(draw.__doc__.split("\n\n")[1].split()))

@@ -10,12 +10,12 @@ from typing import Any
 
 from docutils import nodes
 from docutils.statemachine import StringList
+from sources import imported, path_of, places, public_modules
 from sphinx.application import Sphinx
 from sphinx.domains.python import PyObject
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.inspect import stringify_signature
-from sources import imported, path_of, places, public_modules
 
 LOGGER = logging.getLogger(__name__)
 LEFT_OUT = ("tickwise.cli", "tickwise.__main__")

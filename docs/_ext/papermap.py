@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from typing import Any
 
 from docutils import nodes
+from sources import ROOT, Citation, Place, citations, path_of, places, public_modules
 from sphinx.application import Sphinx
 from sphinx.util import logging
 from sphinx.util.docutils import SphinxDirective
-from sources import ROOT, Citation, Place, citations, path_of, places, public_modules
 from tables import table
 
 LOGGER = logging.getLogger(__name__)

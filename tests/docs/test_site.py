@@ -105,7 +105,7 @@ def test_nobody_is_asked_to_edit(pages: dict[Path, _Page]):
         assert not [link for link in page.links if "/edit/" in link or "_sources" in link], path
 
 
-def test_every_public_name_has_its_entry(site: Path, pages: dict[Path, _Page]):
+def test_every_public_name_has_its_entry(pages: dict[Path, _Page]):
     import tickwise
 
     anchors = {anchor for path, page in pages.items() if "api" in path.parts for anchor in page.anchors}

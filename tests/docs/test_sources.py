@@ -74,5 +74,5 @@ def test_public_modules_have_no_private_ones():
 
 
 def test_a_missing_module_is_told():
-    with pytest.raises(FileNotFoundError, match="no module tickwise.nothing"):
+    with pytest.raises(FileNotFoundError, match=r"no module tickwise.nothing"):
         sources.path_of("tickwise.nothing")

@@ -55,7 +55,7 @@ def test_a_page_becomes_steps():
 
 
 def test_an_output_belongs_to_code():
-    with pytest.raises(ValueError, match="line 2: a text block without a python block"):
+    with pytest.raises(ValueError, match=r"line 2: a text block without a python block"):
         pages.steps("```text\n1\n```\n")
 
 
@@ -66,5 +66,5 @@ def test_times_may_differ_and_nothing_else():
 
 def test_a_command_that_fails_is_told():
     (step,) = pages.steps("```console\n$ tickwise check 'F[0,9]' nowhere.csv\n```\n")
-    with pytest.raises(ValueError, match="line 2: .* is no command that succeeds"):
+    with pytest.raises(ValueError, match=r"line 2: .* is no command that succeeds"):
         pages.run(step, {})
