@@ -51,7 +51,7 @@ class Automaton(_Picture):
 
 
 class Drawing(_Picture):
-    """A drawing of the module beside this one, by the name of its function; what its docstring describes stands for the picture."""
+    """A drawing of the module beside this one, by the name of its function, whose docstring describes the picture."""
 
     def run(self) -> list[nodes.Node]:
         """The figure."""

@@ -451,7 +451,10 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
         "lengths are from 1 to 4; they must be from 1 to 3 ticks",
     ),
     "labels of one class": (lambda: tw.MITLClassifier().fit(X, [1] * 4), "no trajectory has label -1; give"),
-    "labels of another set": (lambda: tw.MITLClassifier().fit(X, [0, 0, 2, 2]), "has label 0; use 1 or -1"),
+    "labels of another set": (
+        lambda: tw.MITLClassifier().fit(X, [0, 1, 2, 2]),
+        "there are 3 different labels, 0, 1, 2; use",
+    ),
     "labels too few": (lambda: tw.MITLClassifier().fit(X, [1]), "for 4 trajectories; give one label per trajectory"),
     "no trajectories": (lambda: tw.MITLClassifier().fit([], []), "there is no trajectory; give at least one"),
     "nothing to fit": (lambda: tw.MITLClassifier().fit(None, Y), "the trajectories are None; give an array, or a list"),
@@ -606,7 +609,7 @@ def test_a_reader_that_goes_away(tmp_path: Path):
         ["bash", "-c", f"set -o pipefail; {command}"], cwd=ROOT, text=True, capture_output=True, check=False,
         env={**os.environ, **PLAIN}, timeout=120,
     )  # fmt: skip
-    assert piped.stdout.startswith("t0\t")
+    assert piped.stdout.startswith("trajectory\t")
     assert piped.stderr == ""
     assert piped.returncode == 1
     # where messages go there too

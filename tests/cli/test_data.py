@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console
 
 from tests.test_cli import Tickwise, csv
-from tickwise.cli import evidence
+from tickwise.cli import evidence, listing
 
 FORMULA = "F[3,3] (x >= 5)"
 
@@ -68,7 +68,8 @@ def test_check_on_a_terminal_ends_with_what_it_separates(
 ):
     with (tmp_path / "shown").open("w", encoding="utf-8") as file:
         terminal = Console(file=file, force_terminal=True, width=100, color_system=None, markup=False)
-        monkeypatch.setattr(evidence, "output", terminal)
+        for module in (evidence, listing):
+            monkeypatch.setattr(module, "output", terminal)
         assert tickwise("check", FORMULA, logs, "--summary").status == 0
     shown = (tmp_path / "shown").read_text(encoding="utf-8")
     assert "│ -1    │           0 │            6 │" in shown

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.table import Table
 
 from tickwise.cli.app import COLUMNS, JsonFlag, command, output, print_json
 from tickwise.cli.evidence import page_path, show_explanation, write_page
+from tickwise.cli.listing import show_rows
 from tickwise.errors import DataError
 
 if TYPE_CHECKING:
@@ -51,7 +51,12 @@ def check(
         print_json({"trajectories": rows, **({} if found is None else found.document())})
         return
     if not summary:
-        _show(_rows(phi, known))
+        digits = ".6g" if output.is_terminal else ""
+        cells = (
+            (name, verdict, "" if robustness is None else format(robustness, digits))
+            for name, verdict, robustness in _rows(phi, known)
+        )
+        show_rows(("trajectory", "verdict", "robustness"), cells, numbers=2)
     if found is not None and (summary or output.is_terminal):
         show_explanation(found)
     if page is not None and output.is_terminal:
@@ -80,14 +85,3 @@ def _rows(phi: Formula, known: LabelledTrajectories) -> list[tuple[str, str, flo
         (name, Verdict(int(verdict)).name.lower(), float(value) if np.isfinite(value) else None)
         for name, verdict, value in zip(known.ids, np.atleast_1d(verdicts), np.atleast_1d(robustness), strict=True)
     ]
-
-
-def _show(rows: list[tuple[str, str, float | None]]) -> None:
-    if output.is_terminal:
-        table = Table("trajectory", "verdict", "robustness")
-        for name, shown, value in rows:
-            table.add_row(name, shown, "" if value is None else f"{value:.6g}")
-        output.print(table)
-        return
-    for name, shown, value in rows:
-        print(name, shown, "" if value is None else value, sep="\t")

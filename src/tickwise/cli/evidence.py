@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.table import Table
-
 from tickwise.cli.app import output
+from tickwise.cli.listing import show_rows
 from tickwise.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -16,27 +14,6 @@ if TYPE_CHECKING:
     from tickwise.inference.validation import Validation
 
 _MOST_LISTED = 20  # mistakes on a terminal; the page and JSON have all
-
-
-def show_rows(header: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: int = 0) -> None:
-    """Show a table: with lines around it on a terminal, its header and rows separated by tabs elsewhere.
-
-    Args:
-        header: The names of the columns.
-        rows: The cells.
-        numbers: From which column on there are numbers.
-    """
-    if not output.is_terminal:
-        for row in (header, *rows):
-            print(*row, sep="\t")
-        return
-    table = Table()
-    for index, name in enumerate(header):
-        right = 0 < numbers <= index
-        table.add_column(name, justify="right" if right else "left", overflow="fold", no_wrap=right)
-    for row in rows:
-        table.add_row(*row)
-    output.print(table)
 
 
 def show_confusion(found: Confusion, title: str = "label") -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from rich.table import Table
 
@@ -15,6 +15,23 @@ def show(item: str | Table) -> None:
         output.print(item)
     else:
         print("\n".join(tab_separated(item)))
+
+
+def show_rows(header: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: int | None = None) -> None:
+    """Show rows of cells as :func:`show` shows a table.
+
+    Args:
+        header: The names of the columns.
+        rows: The cells.
+        numbers: From which column on there are numbers, which are never broken into two lines; None for nowhere.
+    """
+    table = Table()
+    for index, name in enumerate(header):
+        right = numbers is not None and index >= numbers
+        table.add_column(name, justify="right" if right else "left", overflow="fold", no_wrap=right)
+    for row in rows:
+        table.add_row(*row)
+    show(table)
 
 
 def tab_separated(table: Table) -> Iterator[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from tickwise._seeding import generator
+from tickwise._wording import brief
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.frames import is_frame, split_frame
@@ -266,6 +267,10 @@ def _split(X: States, y: ArrayLike | None, *, needed: bool = True) -> tuple[Any,
     """The states, those of a data frame as trajectories, and the labels."""
     states: Any
     states, own = split_frame(X) if is_frame(X) else (X, None)
+    if not hasattr(states, "__len__"):
+        raise DataError(f"the trajectories are {brief(states)}; give an array, or a list of arrays")
+    if len(states) == 0:
+        raise DataError("there is no trajectory; give at least one")
     if y is None and own is None:
         if needed:
             where = "; give y, or a data frame with a column 'label'" if is_frame(X) else "; give y"

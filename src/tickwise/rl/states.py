@@ -86,6 +86,27 @@ def tau_memory(mdp: TabularMDP, tau: int = 5) -> Memory:
     return Memory(np.zeros(mdp.n_states, np.int32), delta, letter)
 
 
+def tick_memory(mdp: TabularMDP, horizon: int) -> Memory:
+    """The memory of how many ticks have passed: with it, what is due at a tick can be learned, but not what was done.
+
+    It is what an agent has that sees a clock beside the state, and the baseline that says what the automaton adds.
+
+    Args:
+        mdp: The world.
+        horizon: The last tick that is told from the ones before it.
+
+    Returns:
+        The memory, with ``horizon + 1`` states.
+
+    Raises:
+        ConfigurationError: If the horizon is less than 1.
+    """
+    if horizon < 1:
+        raise ConfigurationError(f"the horizon of counted ticks is {horizon}; use 1 or more")
+    following = np.minimum(np.arange(horizon + 1) + 1, horizon)[:, None]
+    return Memory(np.zeros(mdp.n_states, np.int32), following, np.zeros(mdp.successor.shape, np.int32))
+
+
 def nearest_centroid(mdp: TabularMDP, tables: Sequence[TickTable]) -> NDArray[np.int32]:
     """Choose the disjunct whose first predicate's region has its centroid nearest to the state (Step 3).
 
