@@ -1,26 +1,38 @@
 """The examples do what they say."""
 
-import importlib.util
+import importlib
+import itertools
+import math
 import subprocess
 import sys
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import ModuleType
 
+import numpy as np
 import pytest
 
+from tickwise.envs.planning import best_success_probability
 from tickwise.inference.reading import read_trajectories
 
 ROOT = Path(__file__).parents[1]
 NAVAL = ROOT.parent / "shared" / "data" / "naval" / "naval.npz"
 
+Example = Callable[[str], ModuleType]
+
+
+@pytest.fixture
+def example(monkeypatch: pytest.MonkeyPatch):
+    """Loads an example by its name, as Python does that runs it."""
+    monkeypatch.syspath_prepend(str(ROOT / "examples"))
+    return importlib.import_module
+
 
 @pytest.mark.skipif(not NAVAL.exists(), reason=f"there is no naval data set at {NAVAL}")
 @pytest.mark.parametrize("number", [0, *(pytest.param(fold, marks=pytest.mark.slow) for fold in range(1, 10))])
-def test_a_fold_of_the_naval_data(number: int):
-    spec = importlib.util.spec_from_file_location("naval", ROOT / "examples" / "naval.py")
-    assert spec is not None
-    naval = importlib.util.module_from_spec(spec)
-    sys.modules["naval"] = naval
-    spec.loader.exec_module(naval)
+def test_a_fold_of_the_naval_data(number: int, example: Example):
+    naval = example("naval")
     states, labels, other, truth = naval.folds(NAVAL)[number]
     assert len(states) == 1_800
     assert len(other) == 200
@@ -42,3 +54,101 @@ def test_the_naval_data_are_exported_for_the_command_line(tmp_path: Path):
     # by the data's own rule a vessel is anomalous if it dips below y = 20, or ends beyond x = 30
     anomalous = (data.values[:, :, 1].min(axis=1) < 20) | (data.values[:, -1, 0] > 30)
     assert (anomalous == (data.labels == -1)).all()
+
+
+# environments that others wrote
+
+
+def test_the_median_and_its_interval_by_hand(example: Example):
+    comparison = example("comparison")
+    # of 6 values the least and the greatest hold the median unless all are on one side of it: 1 - 2 / 2^6 = 96.9 %
+    assert comparison.median_interval([3, 1, 2, 6, 5, 4]) == (3.5, 1, 6)
+    # of 20 the sixth and the fifteenth hold it with 95.9 %, the seventh and the fourteenth with 88.5 %
+    assert comparison.median_interval(list(range(1, 21))) == (10.5, 6, 15)
+    # a run that does not get there is longer than all others
+    assert comparison.median_interval([3, 1, None, 6, 5, None]) == (5.5, 1, math.inf)
+    for n in range(6, 30):
+        _, low, high = comparison.median_interval(list(range(1, n + 1)))
+        sides = sum(math.comb(n, k) for k in range(int(low), int(high)))
+        assert sides / 2**n >= 0.95
+
+
+def test_a_level_is_reached_where_ten_evaluations_in_a_row_have_it_in_the_mean(example: Example):
+    episodes_to = example("comparison").episodes_to
+    assert episodes_to(np.array([0.0] * 5 + [1.0] * 20), 100) == 400  # of the ten from the fifth one is 0
+    assert episodes_to(np.array([0.0, 1.0] * 20), 100) is None
+    assert episodes_to(np.ones(10), 100) == 0
+
+
+def test_the_lake_by_its_map(example: Example):
+    lake = example("frozenlake").place(0.9)
+    assert lake.mdp.variables == ("row", "column")
+    assert lake.mdp.n_states == 64
+    # where nothing slips the requirement is met surely: 14 moves from tick 12 on arrive at tick 26
+    firm = example("frozenlake").place(1.0)
+    assert best_success_probability(firm.mdp, firm.requirement.table(firm.mdp)) == pytest.approx(1)
+    assert best_success_probability(lake.mdp, lake.requirement.table(lake.mdp)) < 0.95
+
+
+def test_what_the_lake_s_logs_say_and_what_it_buys(
+    example: Example, capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    lake = example("frozenlake")
+    monkeypatch.setattr(lake, "LEARNING", replace(lake.LEARNING, episodes=30_000, plays=100))
+    monkeypatch.setattr(sys, "argv", ["frozenlake", "--out", str(tmp_path), "--seeds", "2", "--threads", "1"])
+    lake.main()
+    shown = capsys.readouterr().out
+    assert "target: G[4,12] (row <= 2.5 & column <= 1.5) & " in shown
+    rows = {line[:36].strip(): line.split() for line in shown.splitlines() if line.endswith("of 2")}
+    assert rows["state"][-3:] == rows["state and tick"][-3:] == ["0", "of", "2"]
+    assert rows["extended state, transferred values"][-3:] == ["2", "of", "2"]
+    assert (tmp_path / "frozenlake.png").stat().st_size > 10_000
+
+
+def test_key_and_door(example: Example):
+    pytest.importorskip("minigrid", reason="MiniGrid is not installed")
+    doorkey = example("doorkey")
+    env = doorkey.Facts(doorkey.gymnasium.make("MiniGrid-DoorKey-5x5-v0"))
+    found, _ = env.reset(seed=0)
+    facts = env.unwrapped
+    assert found.tolist() == [*facts.agent_pos, facts.agent_dir, 0, 0]  # no key yet, and the door is locked
+    near = doorkey.place(5, 0)
+    assert near.mdp.variables == ("x", "y", "carrying", "door")  # where it looks is no word of formulas
+    doors = {(carrying, door) for _, _, carrying, door in near.mdp.coordinates.astype(int).tolist()}
+    # the door is unlocked with the key only, and the key is not put down again
+    assert doors == {(0, 0), (1, 0), (1, 1), (1, 2)}
+    assert best_success_probability(near.mdp, near.requirement.table(near.mdp)) == pytest.approx(1)
+    # an obvious player of the table and of the environment agree
+    rng = np.random.default_rng(0)
+    state = int(np.flatnonzero(near.mdp.initial)[0])
+    for _ in itertools.repeat(None, 200):
+        action = int(rng.integers(5))
+        state = int(near.mdp.successor[state, action, 0])
+        found, _, ended, *_ = env.step(action)
+        assert near.mdp.coordinates[state].tolist() == np.delete(found, 2).tolist()
+        if ended:
+            break
+
+
+def test_times_of_key_and_door_are_inferred_and_transferred(example: Example):
+    """As in the example, with two layouts of the small world and of one a little larger."""
+    pytest.importorskip("minigrid", reason="MiniGrid is not installed")
+    comparison, doorkey = example("comparison"), example("doorkey")
+    rng = np.random.default_rng(0)
+    places = [doorkey.places(size, [100, 101]) for size in (5, 6)]
+    settings, _ = doorkey.LOGS[5]
+    logs = [comparison.logged(each, settings, 10_000, 1_500, rng) for each in places]
+    found = comparison.inferred(
+        *logs,
+        comparison.InferenceSettings(size=3, rate=0.99, information_weight=0.001),
+        comparison.ExactSettings(joint=True, levels=8),
+    )
+    for formula, data in zip(found.formulas, logs, strict=True):
+        kept = formula.formula.verdict(data.values, variables=data.variables) > 0
+        assert (kept == (data.labels > 0)).mean() >= 0.99
+    learning = replace(doorkey.LEARNING, source_episodes=20_000, episodes=10_000)
+    near, far = places[0][0], places[1][0]
+    run = comparison.curves(found, near, far, learning, 0)
+    alone, helped = (comparison.episodes_to(run[name], learning.step) for name in list(comparison.METHODS)[2:])
+    assert helped < alone
+    assert run["state and tick"][-20:].mean() < 0.5

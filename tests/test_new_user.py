@@ -60,4 +60,9 @@ def test_the_formula_carries_over_to_new_data(kettles: Path, tmp_path: Path):
         lines += [f"{name},{tick},{95 if tick == hottest else 50},1000" for tick in range(18)]
     fresh.write_text("\n".join(lines) + "\n", encoding="utf-8")
     rows = [line.split("\t")[:2] for line in answer_of("check", formula, fresh).out.splitlines()]
-    assert rows == [["hot in time", "true"], ["hot too late", "false"], ["never hot", "false"]]
+    assert rows == [
+        ["trajectory", "verdict"],
+        ["hot in time", "true"],
+        ["hot too late", "false"],
+        ["never hot", "false"],
+    ]

@@ -453,7 +453,7 @@ CALLS: dict[str, tuple[Callable[[], object], str]] = {
     "labels of one class": (lambda: tw.MITLClassifier().fit(X, [1] * 4), "no trajectory has label -1; give"),
     "labels of another set": (
         lambda: tw.MITLClassifier().fit(X, [0, 1, 2, 2]),
-        "there are 3 different labels, 0, 1, 2; use",
+        "there are 3 different labels, 0, 1, 2",
     ),
     "labels too few": (lambda: tw.MITLClassifier().fit(X, [1]), "for 4 trajectories; give one label per trajectory"),
     "no trajectories": (lambda: tw.MITLClassifier().fit([], []), "there is no trajectory; give at least one"),

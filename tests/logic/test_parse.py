@@ -169,7 +169,7 @@ ERRORS = [
     ("3 <= 4", 6, "found '4', expected a variable's name"),
     ("3 <= x >= 4", 8, "<= and >= do not make a range; write one such as 3 <= x <= 4"),
     ("4 <= x <= 3", 1, "the range of 'x' is empty: 4 > 3; swap the bounds"),
-    ("3 < x < 3", 1, "the range of 'x' is empty: both bounds are 3"),
+    ("3 < x < 3", 1, "the range of 'x' is empty: both bounds are 3; use <= or >="),
     ("x >= 1e999", 6, "the number 1e999 is too large"),
     (
         r"(x>3)\wedge~(y>3)",

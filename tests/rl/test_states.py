@@ -32,6 +32,7 @@ from tickwise.rl.states import (
     nearest_region,
     state_letters,
     tau_memory,
+    tick_memory,
 )
 
 SOURCE_1 = "F[1,15] G[0,4] (3 <= x <= 4 & 3 <= y <= 5) & F[21,39] (7 <= x <= 8 & 5 <= y <= 8)"
@@ -57,7 +58,7 @@ def walk(mdp: TabularMDP, memory: Memory, rng: np.random.Generator, ticks: int) 
     return states, remembered
 
 
-# τ-states
+# τ-states and ticks
 
 
 @settings(max_examples=150, deadline=None)
@@ -109,6 +110,19 @@ def test_tau_memory_has_a_digit_for_each_state_before():
 def test_tau_of_zero_is_refused():
     with pytest.raises(ConfigurationError, match="horizon of τ-states is 0; use 1 or more"):
         tau_memory(GridWorld(1).mdp(), 0)
+
+
+def test_tick_memory_counts_ticks_up_to_its_horizon():
+    mdp = random_mdp(np.random.default_rng(0), 4, 2, 3)
+    memory = tick_memory(mdp, 3)
+    assert memory.n_states == 4
+    _, remembered = walk(mdp, memory, np.random.default_rng(1), 6)
+    assert remembered == [0, 1, 2, 3, 3, 3, 3]
+
+
+def test_a_tick_memory_counts_something():
+    with pytest.raises(ConfigurationError, match="horizon of counted ticks is 0; use 1 or more"):
+        tick_memory(GridWorld(1).mdp(), 0)
 
 
 # extended states
