@@ -7,10 +7,10 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --no-input --quiet
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-slow lint types bench kills cluster-faults lock clean
+.PHONY: help demo test test-slow sb3 docs lint types bench kills cluster-faults lock clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' $(MAKEFILE_LIST) | expand -t 18
+	@sed -n 's/^\([a-z0-9-]*\):.*## /  \1\t/p' $(MAKEFILE_LIST) | expand -t 18
 
 demo: $(VENV)/.runtime ## reproduce Case Study 1 with few runs, and write its report
 	$(BIN)/tickwise reproduce case1 --quick --out runs/case1-quick
@@ -20,6 +20,11 @@ test: $(VENV)/.development ## run the tests
 
 test-slow: $(VENV)/.development ## run the longer studies too
 	$(BIN)/python -m pytest -n $(WORKERS) -m "slow or not slow" tests
+
+sb3: $(VENV)/.sb3 ## install Stable-Baselines3 and PyTorch too, so that `make test` has their tests
+
+docs: $(VENV)/.development ## build the documentation in build/docs; a warning is an error
+	NO_COLOR=1 $(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
 
 lint: $(VENV)/.development ## check style and layout
 	$(BIN)/ruff check .
@@ -64,8 +69,15 @@ build/bench/.peers: requirements.lock benchmarks/requirements.txt pyproject.toml
 	done
 	@touch $@
 
+# Stable-Baselines3 brings PyTorch, which is larger than all else together: whoever wants its tests asks for it.
+$(VENV)/.sb3: $(VENV)/.development requirements-sb3.lock
+	$(PIP) install --requirement requirements-sb3.lock
+	@touch $@
+
 # rtamt has no release for Python 3.13: run this with 3.11 or 3.12
 FREEZE := build/lock/bin/python -m pip freeze --exclude tickwise
+# which build of PyTorch, and what that build alone needs, is for each machine to choose
+PORTABLE := sed -E '/^(nvidia|triton|cuda)/d; s/\+[a-z0-9.]+$$//'
 PINS := sed -E 's/^(rtamt|antlr4-python3-runtime)==.*/&; python_version < "3.13"/'
 
 lock: ## resolve the lock files anew
@@ -75,8 +87,11 @@ lock: ## resolve the lock files anew
 	{ head -n 1 requirements.lock; $(FREEZE); } > build/runtime.lock
 	build/lock/bin/python -m pip install --quiet '.[dev]'
 	{ head -n 1 requirements-dev.lock; $(FREEZE) | $(PINS); } > build/development.lock
+	build/lock/bin/python -m pip install --quiet '.[sb3]'
+	{ head -n 1 requirements-sb3.lock; $(FREEZE) | $(PORTABLE) | $(PINS) | grep -vxFf build/development.lock; } > build/sb3.lock
 	mv build/runtime.lock requirements.lock
 	mv build/development.lock requirements-dev.lock
+	mv build/sb3.lock requirements-sb3.lock
 
 clean: ## remove the environment and what can be made again; runs/ stays
 	rm -rf $(VENV) build dist .pytest_cache .hypothesis .mypy_cache .ruff_cache

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import matplotlib
@@ -67,6 +68,11 @@ class Place:
         """A world and the formulas over it; an episode lasts until the deadline, since what is over stays over."""
         tasks = (FormulaTask(text, deadline, reward=100, penalty=0) for text in (requirement, wish))
         return cls(tabulation.mdp, *tasks)
+
+    @cached_property
+    def best(self) -> float:
+        """The probability with which the best policy meets the requirement."""
+        return best_success_probability(self.mdp, self.requirement.table(self.mdp))
 
 
 @dataclass(frozen=True)
@@ -209,7 +215,7 @@ def curves(
         reaches, before learning and after each step, shape ``(episodes / step + 1,)``.
     """
     task = target.requirement.table(target.mdp)
-    best = best_success_probability(target.mdp, task) * target.requirement.reward
+    best = target.best * target.requirement.reward
     result = {}
     for number, (name, memory) in enumerate(memories(found.formulas[1], target).items()):
         problem, rng = Problem(target.mdp, task, memory), np.random.default_rng((seed, number))

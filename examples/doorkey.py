@@ -12,8 +12,9 @@ that merely wants the goal, in ten layouts each; learning is then compared in la
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, SupportsFloat
 
@@ -95,16 +96,18 @@ def place(size: int, layout: int) -> Place:
     return Place.of(tabulation, f"{TIMES} & F[22,{DEADLINE}] {goal}", f"F[0,{DEADLINE}] {goal}", DEADLINE)
 
 
-def places(size: int, layouts: Iterable[int]) -> list[Place]:
-    """Some layouts of DoorKey, told of as they come, since tabulating takes seconds."""
-    result = []
+def places(size: int, layouts: Iterable[int]) -> Iterator[Place]:
+    """Some layouts of DoorKey, told of on a terminal as they come, since tabulating takes seconds."""
     for layout in layouts:
-        result.append(place(size, layout))
         if sys.stderr.isatty():
-            print(f"\rDoorKey {size}×{size}: layout {layout} tabulated", end="", file=sys.stderr, flush=True)
-    if sys.stderr.isatty():
-        print(file=sys.stderr)
-    return result
+            print(f"DoorKey {size}×{size}: tabulating layout {layout} ", end="\r", file=sys.stderr, flush=True)
+        yield place(size, layout)
+
+
+def pairs(count: int) -> list[tuple[Place, Place]]:
+    """The first layouts of both sizes in which all can be done in time."""
+    near, far = ((each for each in places(size, itertools.count()) if each.best > 0) for size in LOGS)
+    return list(itertools.islice(zip(near, far, strict=True), count))
 
 
 def main() -> None:
@@ -115,13 +118,12 @@ def main() -> None:
     parser.add_argument("--threads", type=int, default=2, help="threads of each search")
     arguments = parser.parse_args()
     rng = np.random.default_rng(0)
-    source, target = (logged(places(size, range(100, 110)), *how, KEPT, rng) for size, how in LOGS.items())
+    source, target = (logged(list(places(size, range(100, 110))), *how, KEPT, rng) for size, how in LOGS.items())
     print(f"logs: {source.positives} good of {len(source)}, and {target.positives} good of {len(target)} kept")
     constants = InferenceSettings(size=4, rate=0.99, information_weight=0.001)
     found = inferred(source, target, constants, ExactSettings(joint=True, threads=arguments.threads))
     print(f"source: {found.formulas[0]}\ntarget: {found.formulas[1]}\n{found.reason}")
-    pairs = zip(places(5, range(arguments.seeds)), places(8, range(arguments.seeds)), strict=True)
-    runs = [curves(found, near, far, LEARNING, seed) for seed, (near, far) in enumerate(pairs)]
+    runs = [curves(found, near, far, LEARNING, seed) for seed, (near, far) in enumerate(pairs(arguments.seeds))]
     print(table(runs, LEARNING.step))
     arguments.out.mkdir(parents=True, exist_ok=True)
     draw(runs, LEARNING, f"DoorKey 8×8, {len(runs)} layouts", arguments.out / "doorkey.png")

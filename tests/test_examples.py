@@ -13,7 +13,6 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from tickwise.envs.planning import best_success_probability
 from tickwise.inference.reading import read_trajectories
 
 ROOT = Path(__file__).parents[1]
@@ -86,8 +85,8 @@ def test_the_lake_by_its_map(example: Example):
     assert lake.mdp.n_states == 64
     # where nothing slips the requirement is met surely: 14 moves from tick 12 on arrive at tick 26
     firm = example("frozenlake").place(1.0)
-    assert best_success_probability(firm.mdp, firm.requirement.table(firm.mdp)) == pytest.approx(1)
-    assert best_success_probability(lake.mdp, lake.requirement.table(lake.mdp)) < 0.95
+    assert firm.best == pytest.approx(1)
+    assert lake.best < 0.95
 
 
 def test_what_the_lake_s_logs_say_and_what_it_buys(
@@ -117,7 +116,7 @@ def test_key_and_door(example: Example):
     doors = {(carrying, door) for _, _, carrying, door in near.mdp.coordinates.astype(int).tolist()}
     # the door is unlocked with the key only, and the key is not put down again
     assert doors == {(0, 0), (1, 0), (1, 1), (1, 2)}
-    assert best_success_probability(near.mdp, near.requirement.table(near.mdp)) == pytest.approx(1)
+    assert near.best == pytest.approx(1)
     # an obvious player of the table and of the environment agree
     rng = np.random.default_rng(0)
     state = int(np.flatnonzero(near.mdp.initial)[0])
@@ -135,7 +134,7 @@ def test_times_of_key_and_door_are_inferred_and_transferred(example: Example):
     pytest.importorskip("minigrid", reason="MiniGrid is not installed")
     comparison, doorkey = example("comparison"), example("doorkey")
     rng = np.random.default_rng(0)
-    places = [doorkey.places(size, [100, 101]) for size in (5, 6)]
+    places = [list(doorkey.places(size, [100, 101])) for size in (5, 6)]
     settings, _ = doorkey.LOGS[5]
     logs = [comparison.logged(each, settings, 10_000, 1_500, rng) for each in places]
     found = comparison.inferred(
