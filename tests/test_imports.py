@@ -34,6 +34,8 @@ CONFINED = {
     "lark": ("logic/parse.py",),
     "gymnasium": ("envs/",),
     "matplotlib": ("experiments/figures/",),
+    "stable_baselines3": ("transfer/deep.py",),
+    "torch": ("transfer/deep.py",),
     "distributed": ("experiments/cluster.py", "experiments/remote.py"),
     "typer": ("cli/",),
     "rich": ("cli/", "experiments/progress.py", "experiments/tables.py"),

@@ -100,17 +100,32 @@ def similar_states(
         Source states, shape ``(target states,)``.
     """
     source_cells, target_cells = source_mdp.cell_coordinates, target_mdp.cell_coordinates
-    source_relative = source_cells - source_centre
-    target_relative = target_cells - target_centre
-    distance = ((target_relative[:, None, :] - source_relative[None, :, :]) ** 2).sum(axis=2)
     differs = (
         holds(target, target_cells, target_mdp.variables)[:, None]
         != holds(source, source_cells, source_mdp.variables)[None, :]
     )
+    nearest = most_alike(source_cells - source_centre, target_cells - target_centre, differs)
+    return _members(source_mdp)[nearest[target_mdp.cell], _orientation(target_mdp)]
+
+
+def most_alike(
+    source: NDArray[np.float64], target: NDArray[np.float64], differs: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """For each of the target's places the nearest of the source's, both relative to their landmarks.
+
+    Args:
+        source: Places, shape ``(source places, variables)``.
+        target: Places, shape ``(target places, variables)``.
+        differs: Where the predicates' truth values differ, shape ``(target places, source places)``; of places at the
+            same distance, one where they do not comes first, then the lower number.
+
+    Returns:
+        Numbers of the source's places, shape ``(target places,)``.
+    """
+    distance = ((target[:, None, :] - source[None, :, :]) ** 2).sum(axis=2)
     # distances between grid points differ by far more than rounding does
     rank = np.lexsort((differs, np.round(distance, 9)), axis=1)
-    nearest = rank[:, 0]
-    return _members(source_mdp)[nearest[target_mdp.cell], _orientation(target_mdp)]
+    return np.asarray(rank[:, 0], dtype=np.int64)
 
 
 def similar_valuations(source: TickTable, target: TickTable, xi: Bijections) -> NDArray[np.int64]:

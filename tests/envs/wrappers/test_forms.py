@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from tests.envs.wrappers.worlds import FORMULAS, NUMBERED, Env, frozen_lake, random_episodes
 from tickwise.automata.monitor import Monitor
 from tickwise.envs.wrappers import ExtendedState, Labelled
-from tickwise.envs.wrappers.forms import Places, make_form, numbering
+from tickwise.envs.wrappers.forms import Places, make_form, numbering, observation_of
 from tickwise.errors import ConfigurationError, DataError
 
 PLACES = Places.of(Monitor.of("F[0,3] (x >= 2) & G[5,6] F[0,2] (x <= 1) | G[2,4] (x >= 5)", ("x",)))
@@ -89,20 +89,42 @@ def inner_spaces() -> st.SearchStrategy[gymnasium.Space[Any]]:
 @settings(max_examples=60)
 @given(inner_spaces(), st.integers(0, 2**16))
 def test_a_flat_observation_is_gymnasiums_flattened_one_and_location_and_clocks(space: Any, seed: int):
-    extended, observe = make_form("flat", space, PLACES)
+    form = make_form("flat", space, PLACES)
     space.seed(seed)
     inner = space.sample()
     rng = np.random.default_rng(seed)
-    disjunct = np.asarray(rng.integers(2))
-    state = np.asarray(rng.integers(4))
-    flat = observe(inner, disjunct, state)
-    assert extended.contains(flat)
-    number = PLACES.number(disjunct, state)
+    number = PLACES.number(np.asarray(rng.integers(2)), np.asarray(rng.integers(4)))
+    flat = form.extend(inner, number)
+    assert form.space.contains(flat)
     width = flat.size - PLACES.locations - PLACES.clocks
     np.testing.assert_array_equal(flat[:width], spaces.flatten(space, inner).astype(np.float32))
     location, clocks = np.split(flat[width:], [PLACES.locations])
     assert np.flatnonzero(location).tolist() == [PLACES.location_of[number]]
     np.testing.assert_allclose(clocks * PLACES.longest, PLACES.clocks_of[number], rtol=1e-6)
+
+
+@pytest.mark.parametrize(("make", "form"), CASES)
+def test_an_extended_observation_comes_apart_into_what_it_was_made_of(make: Any, form: str):
+    env = made(make, form)
+    for episode in random_episodes(env, 3, seed=2):
+        for observation, info in ((step[0], step[-1]) for step in episode):
+            inner, number = env.split(observation)
+            assert number == info["table_state"]
+            assert env.env.observation_space.contains(inner)
+            again = env.extend(inner, number)
+            np.testing.assert_equal(again, observation)
+
+
+@pytest.mark.parametrize("form", ["dict", "flat"])
+def test_what_no_automaton_has_is_told(form: str):
+    env = made(frozen_lake, form)
+    observation, _ = env.reset(seed=0)
+    if form == "dict":
+        observation["clocks"] = observation["clocks"] + 99
+    else:
+        observation[-1] = 99
+    with pytest.raises(DataError, match="no automaton has location 0 with clocks"):
+        env.split(observation)
 
 
 @given(st.lists(st.integers(1, 4), min_size=1, max_size=4), st.integers(-3, 3))
@@ -112,6 +134,7 @@ def test_numbers_are_those_from_0_each_once(sizes: list[int], start: int):
     everything = np.array(list(np.ndindex(*sizes))) + start
     assert count == len(everything)
     np.testing.assert_array_equal(number(everything), np.arange(count))
+    np.testing.assert_array_equal([observation_of(space, each) for each in range(count)], everything)
     assert [int(number(each)) for each in everything] == list(range(count))
 
 
@@ -157,15 +180,15 @@ def test_a_form_that_does_not_fit_is_refused(form: str, space: Any, message: str
     ],
 )
 def test_an_observation_outside_its_space_is_refused(form: str, space: Any, observation: Any):
-    _, observe = make_form(form, space, PLACES)
+    extend = make_form(form, space, PLACES).extend
     with pytest.raises(DataError, match="is not in") as caught:
-        observe(observation, np.asarray(0), np.asarray(0))
+        extend(observation, np.asarray(0))
     assert "\n" not in str(caught.value)
 
 
 def test_a_bound_beyond_single_precision_is_none():
-    extended, observe = make_form("flat", spaces.Box(-1e300, 1e300, (1,), dtype=np.float64), PLACES)
-    assert extended.contains(observe(np.array([1e30]), np.asarray(0), np.asarray(0)))
+    form = make_form("flat", spaces.Box(-1e300, 1e300, (1,), dtype=np.float64), PLACES)
+    assert form.space.contains(form.extend(np.array([1e30]), np.asarray(0)))
 
 
 def test_extended_state_needs_labels():

@@ -59,6 +59,7 @@ class ExtendedState(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
 
     Attributes:
         monitor: The formula's automata.
+        places: Their locations and clocks in one numbering.
 
     Raises:
         ConfigurationError: If the environment has no named features, or the form does not fit the observation.
@@ -77,8 +78,9 @@ class ExtendedState(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         RecordConstructorArgs.__init__(self, formula=formula, form=form, reduce=reduce)
         super().__init__(env)
         self.monitor = Monitor.of(formula, feature_names(env, "ExtendedState"), reduce=reduce)
-        self._places = Places.of(self.monitor)
-        self.observation_space, self._observe = make_form(form, env.observation_space, self._places)
+        self.places = Places.of(self.monitor)
+        self._form = make_form(form, env.observation_space, self.places)
+        self.observation_space = self._form.space
         self._states = np.zeros(len(self.monitor.tables), dtype=np.int64)
         self._disjunct = np.zeros((), dtype=np.int64)
 
@@ -95,11 +97,24 @@ class ExtendedState(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs
         self._states = self.monitor.advance(self._states, info[FEATURES])
         return self._extended(observation), reward, terminated, truncated, info | self._report()
 
+    def extend(self, observation: Any, table_state: int) -> Any:
+        """The extended observation of an observation and the number of a table state."""
+        return self._form.extend(observation, np.asarray(table_state))
+
+    def split(self, observation: Any) -> tuple[Any, int]:
+        """The observation and the number of the table state that an extended observation is made of.
+
+        Raises:
+            DataError: If it is not made of any.
+        """
+        return self._form.split(observation)
+
     def _extended(self, observation: Any) -> Any:
-        return self._observe(observation, self._disjunct, self._states[self._disjunct])
+        number = self.places.number(self._disjunct, self._states[self._disjunct])
+        return self._form.extend(observation, number)
 
     def _report(self) -> dict[str, Any]:
-        return report(self.monitor, self._places, self._disjunct, self._states)
+        return report(self.monitor, self.places, self._disjunct, self._states)
 
 
 def report(monitor: Monitor, places: Places, disjunct: NDArray[np.int64], states: NDArray[np.int64]) -> dict[str, Any]:

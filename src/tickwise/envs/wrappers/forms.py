@@ -15,10 +15,6 @@ from numpy.typing import NDArray
 from tickwise.automata.monitor import Monitor
 from tickwise.errors import ConfigurationError, DataError
 
-Observe = Callable[[Any, NDArray[np.int64], NDArray[np.int64]], Any]
-"""Joins an observation, a disjunct and its table state, for one environment or with a first axis for many."""
-
-
 _MOST_NUMBERS = 2**62
 """As many observations, or more, are not numbered."""
 
@@ -72,8 +68,35 @@ class Places:
         """The number of a disjunct's table state among all."""
         return np.asarray(self.first_state[disjunct] + state, dtype=np.int64)
 
+    def find(self, location: int, clocks: NDArray[Any]) -> int:
+        """The number of the table state with a location and clock values.
 
-def make_form(form: str, space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
+        Raises:
+            DataError: If the automata have none.
+        """
+        same = (self.location_of == location) & (self.clocks_of == clocks).all(axis=1)
+        found = np.flatnonzero(same)
+        if not len(found):
+            raise DataError(f"no automaton has location {location} with clocks {clocks}; give an extended observation")
+        return int(found[-1])  # the start, before the first letter, comes before all others and is never observed
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Form:
+    """A form of the extended state.
+
+    Attributes:
+        space: The space of extended observations.
+        extend: Joins an observation and the number of a table state, for one environment or with a first axis for many.
+        split: Takes one extended observation apart again.
+    """
+
+    space: gymnasium.Space[Any]
+    extend: Callable[[Any, NDArray[np.int64]], Any]
+    split: Callable[[Any], tuple[Any, int]]
+
+
+def make_form(form: str, space: gymnasium.Space[Any], places: Places) -> Form:
     """A form of the extended state.
 
     Args:
@@ -82,7 +105,7 @@ def make_form(form: str, space: gymnasium.Space[Any], places: Places) -> tuple[g
         places: The locations and clocks of the formula's automata.
 
     Returns:
-        The space of extended observations, and the function that makes them.
+        The space of extended observations, and how they are made and taken apart.
 
     Raises:
         ConfigurationError: If there is no such form, or the observation does not allow it.
@@ -93,7 +116,7 @@ def make_form(form: str, space: gymnasium.Space[Any], places: Places) -> tuple[g
     return forms[form](space, places)
 
 
-def _as_dict(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
+def _as_dict(space: gymnasium.Space[Any], places: Places) -> Form:
     inner = dict(space.spaces) if isinstance(space, spaces.Dict) else {"observation": space}
     taken = {"location", "clocks"} & inner.keys()
     if taken:
@@ -109,39 +132,51 @@ def _as_dict(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Spa
         }
     )
 
-    def observe(observation: Any, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> dict[str, Any]:
-        number = places.number(disjunct, state)
+    def extend(observation: Any, number: NDArray[np.int64]) -> dict[str, Any]:
         entries = dict(observation) if isinstance(space, spaces.Dict) else {"observation": observation}
         location = places.location_of[number]
         return entries | {"location": location, "clocks": places.clocks_of[number].astype(np.float32)}
 
-    return extended, observe
+    def split(observation: Any) -> tuple[Any, int]:
+        rest = {key: observation[key] for key in inner}
+        number = places.find(int(observation["location"]), observation["clocks"])
+        return rest if isinstance(space, spaces.Dict) else rest["observation"], number
+
+    return Form(extended, extend, split)
 
 
-def _as_flat(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
+def _as_flat(space: gymnasium.Space[Any], places: Places) -> Form:
     inner = _flat_box(space)
     low = np.concatenate([inner.low, np.zeros(places.locations + places.clocks, np.float32)])
     high = np.concatenate([inner.high, np.ones(places.locations + places.clocks, np.float32)])
     one_hot = np.eye(places.locations, dtype=np.float32)
 
-    def observe(observation: Any, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> NDArray[np.float32]:
-        number = places.number(disjunct, state)
+    def extend(observation: Any, number: NDArray[np.int64]) -> NDArray[np.float32]:
         clocks = (places.clocks_of[number] / places.longest).astype(np.float32)
         return np.concatenate([_flat(space, observation), one_hot[places.location_of[number]], clocks], axis=-1)
 
-    return spaces.Box(low, high, dtype=np.float32), observe
+    def split(observation: Any) -> tuple[Any, int]:
+        rest, location, clocks = np.split(observation, [inner.shape[0], inner.shape[0] + places.locations])
+        number = places.find(int(location.argmax()), np.rint(clocks * places.longest))
+        return spaces.unflatten(space, rest), number
+
+    return Form(spaces.Box(low, high, dtype=np.float32), extend, split)
 
 
-def _as_discrete(space: gymnasium.Space[Any], places: Places) -> tuple[gymnasium.Space[Any], Observe]:
+def _as_discrete(space: gymnasium.Space[Any], places: Places) -> Form:
     count, number_of = numbering(space, "form='discrete'")
     states = len(places.location_of) * count
     if states >= _MOST_NUMBERS:
         raise ConfigurationError(f"form='discrete' would number {states} extended states; use another form")
 
-    def observe(observation: Any, disjunct: NDArray[np.int64], state: NDArray[np.int64]) -> NDArray[np.int64]:
-        return np.asarray(places.number(disjunct, state) * count + number_of(observation))[()]
+    def extend(observation: Any, number: NDArray[np.int64]) -> NDArray[np.int64]:
+        return np.asarray(number * count + number_of(observation))[()]
 
-    return spaces.Discrete(states), observe
+    def split(observation: Any) -> tuple[Any, int]:
+        number, rest = divmod(int(observation), count)
+        return observation_of(space, rest), number
+
+    return Form(spaces.Discrete(states), extend, split)
 
 
 def numbering(space: gymnasium.Space[Any], what: str) -> tuple[int, Callable[[Any], NDArray[np.int64]]]:
@@ -169,6 +204,31 @@ def numbering(space: gymnasium.Space[Any], what: str) -> tuple[int, Callable[[An
         f"{what} needs observations that are whole numbers, a Discrete or MultiDiscrete space, not {space}; use "
         "another form, or map the observation with gymnasium.wrappers.TransformObservation"
     )
+
+
+def count_of(space: gymnasium.Space[Any]) -> int | None:
+    """How many observations a space has, or None if they have no numbers."""
+    return numbering(space, "")[0] if isinstance(space, (spaces.Discrete, spaces.MultiDiscrete)) else None
+
+
+def is_vector(space: gymnasium.Space[Any]) -> bool:
+    """Whether observations are vectors of real numbers."""
+    return isinstance(space, spaces.Box) and len(space.shape) == 1
+
+
+def clipped(space: gymnasium.Space[Any], values: NDArray[Any]) -> NDArray[Any]:
+    """The observation of a space of arrays that is nearest to some values."""
+    assert isinstance(space, spaces.Box)
+    return np.asarray(np.clip(values, space.low, space.high), dtype=space.dtype)
+
+
+def observation_of(space: gymnasium.Space[Any], number: int) -> Any:
+    """The observation that has a number in a finite space, see `numbering`."""
+    if isinstance(space, spaces.MultiDiscrete):
+        entries = np.unravel_index(number, tuple(space.nvec))
+        return np.asarray(entries, dtype=space.dtype) + space.start
+    assert isinstance(space, spaces.Discrete)
+    return np.int64(number + space.start)
 
 
 def _counted(space: spaces.Discrete | spaces.MultiDiscrete, observation: Any) -> NDArray[np.int64]:

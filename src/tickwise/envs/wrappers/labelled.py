@@ -30,6 +30,7 @@ class Features:
 
     Attributes:
         names: The names, in order.
+        by_entry: Whether features are the entries of the observation.
 
     Raises:
         ConfigurationError: If there is no feature, a name occurs twice, or names do not fit the observation.
@@ -45,6 +46,7 @@ class Features:
             if not isinstance(name, str) or not name:
                 raise ConfigurationError(f"a feature's name is {name!r}; use text")
         self._functions = list(given.values()) if isinstance(given, Mapping) else None
+        self.by_entry = self._functions is None
         if self._functions is None:
             _check_entries(self.names, space)
         elif not all(callable(function) for function in self._functions):
@@ -118,18 +120,18 @@ class Labelled(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
     def __init__(self, env: gymnasium.Env[Any, Any], features: FeatureMap) -> None:
         RecordConstructorArgs.__init__(self, features=features)
         super().__init__(env)
-        self._features = Features(features, env.observation_space)
-        self.feature_names = self._features.names
+        self.features_of = Features(features, env.observation_space)
+        self.feature_names, self.by_entry = self.features_of.names, self.features_of.by_entry
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin an episode; see the wrapped environment."""
         observation, info = self.env.reset(seed=seed, options=options)
-        return observation, info | {FEATURES: self._features(observation)}
+        return observation, info | {FEATURES: self.features_of(observation)}
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """Go to the next tick; see the wrapped environment."""
         observation, reward, terminated, truncated, info = self.env.step(action)
-        return observation, reward, terminated, truncated, info | {FEATURES: self._features(observation)}
+        return observation, reward, terminated, truncated, info | {FEATURES: self.features_of(observation)}
 
 
 def feature_names(env: Any, wrapper: str) -> tuple[str, ...]:

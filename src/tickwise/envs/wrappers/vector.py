@@ -90,7 +90,8 @@ class VectorExtendedState(VectorWrapper):
         super().__init__(env)
         self.monitor = Monitor.of(formula, feature_names(env, "VectorExtendedState"), reduce=reduce)
         self._places = Places.of(self.monitor)
-        self.single_observation_space, self._observe = make_form(form, env.single_observation_space, self._places)
+        self._form = make_form(form, env.single_observation_space, self._places)
+        self.single_observation_space = self._form.space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self._mode = AutoresetMode(env.metadata.get("autoreset_mode", AutoresetMode.NEXT_STEP))
         self._states = np.zeros((self.num_envs, len(self.monitor.tables)), dtype=np.int64)
@@ -132,15 +133,16 @@ class VectorExtendedState(VectorWrapper):
 
     def _with_last(self, infos: dict[str, Any], over: NDArray[np.bool_]) -> dict[str, Any]:
         """Extend the last observations and information of the episodes that are over."""
-        last = infos[_LAST_OBSERVATION].copy()
+        last, numbers = infos[_LAST_OBSERVATION].copy(), self._numbers()
         for row in np.flatnonzero(over):
-            disjunct = self._disjunct[row]
-            last[row] = self._observe(last[row], disjunct, self._states[row, disjunct])
+            last[row] = self._form.extend(last[row], numbers[row])
         return infos | {_LAST_OBSERVATION: last, _LAST_INFO: infos[_LAST_INFO] | self._report()}
 
     def _extended(self, observations: Any) -> Any:
-        rows = np.arange(self.num_envs)
-        return self._observe(observations, self._disjunct, self._states[rows, self._disjunct])
+        return self._form.extend(observations, self._numbers())
+
+    def _numbers(self) -> NDArray[np.int64]:
+        return self._places.number(self._disjunct, self._states[np.arange(self.num_envs), self._disjunct])
 
     def _report(self) -> dict[str, Any]:
         return report(self.monitor, self._places, self._disjunct, self._states)
