@@ -239,9 +239,9 @@ def episodes_to(shares: NDArray[np.float64], step: int, level: float = 0.9) -> i
 
 
 def table(runs: Sequence[Mapping[str, NDArray[np.float64]]], step: int) -> str:
-    """Episodes to 90 % of the best success: median, its interval, and how many runs got there, as text."""
+    """How long it takes to 90 % of the best success: median, its interval, and how many runs got there, as text."""
     lines = [f"{'agent':<36}{'median':>9}  95 % interval      reached"]
-    for name in METHODS:
+    for name in filter(runs[0].__contains__, METHODS):
         reached = [episodes_to(run[name], step) for run in runs]
         middle, low, high = (_text(value) for value in median_interval(reached))
         there = sum(value is not None for value in reached)
@@ -269,29 +269,37 @@ def _text(value: float) -> str:
     return f"{value:,.0f}" if np.isfinite(value) else "never"
 
 
-def draw(runs: Sequence[Mapping[str, NDArray[np.float64]]], learning: Learning, title: str, path: Path) -> None:
+def draw(
+    runs: Sequence[Mapping[str, NDArray[np.float64]]],
+    total: int,
+    step: int,
+    title: str,
+    path: Path,
+    unit: str = "episodes",
+) -> None:
     """Draw the agents' curves: the mean over the runs and its 95 % interval.
 
     Args:
         runs: What `curves` gives for each seed.
-        learning: How they learned.
+        total: How long they learned.
+        step: How long from one evaluation to the next.
         title: The figure's title.
         path: The file to write.
+        unit: What is counted.
     """
-    episodes = np.arange(0, learning.episodes + 1, learning.step)
+    times = np.arange(0, total + 1, step)
     with matplotlib.rc_context(STYLE):
         figure = canvas(4.4)
         axes = figure.subplots()
-        for name, (colour, line) in METHODS.items():
+        for name in filter(runs[0].__contains__, METHODS):
+            colour, line = METHODS[name]
             shares = np.array([run[name] for run in runs])
             mean, error = shares.mean(axis=0), 1.96 * shares.std(axis=0, ddof=1) / np.sqrt(len(shares))
-            axes.plot(episodes, 100 * mean, color=colour, linestyle=line, linewidth=2, label=name)
-            axes.fill_between(
-                episodes, 100 * (mean - error), 100 * (mean + error), color=colour, alpha=0.15, linewidth=0
-            )
-        axes.set(xlabel="episodes of learning in the target", ylabel="success of the greedy policy, % of the best")
-        axes.set(title=title, xlim=(0, learning.episodes), ylim=(-2, 102))
-        axes.set_xscale("symlog", linthresh=learning.step)
+            axes.plot(times, 100 * mean, color=colour, linestyle=line, linewidth=2, label=name)
+            axes.fill_between(times, 100 * (mean - error), 100 * (mean + error), color=colour, alpha=0.15, linewidth=0)
+        axes.set(xlabel=f"{unit} of learning in the target", ylabel="success of the greedy policy, % of the best")
+        axes.set(title=title, xlim=(0, total), ylim=(-2, 102))
+        axes.set_xscale("symlog", linthresh=step)
         axes.xaxis.set_major_formatter(StrMethodFormatter("{x:,.0f}"))
         axes.grid(axis="y")
         axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))

@@ -126,7 +126,7 @@ def main() -> None:
     runs = [curves(found, near, far, LEARNING, seed) for seed, (near, far) in enumerate(pairs(arguments.seeds))]
     print(table(runs, LEARNING.step))
     arguments.out.mkdir(parents=True, exist_ok=True)
-    draw(runs, LEARNING, f"DoorKey 8×8, {len(runs)} layouts", arguments.out / "doorkey.png")
+    draw(runs, LEARNING.episodes, LEARNING.step, f"DoorKey 8×8, {len(runs)} layouts", arguments.out / "doorkey.png")
     print(f"the curves are in {arguments.out / 'doorkey.png'}")
 
 

@@ -64,7 +64,13 @@ def main() -> None:
     runs = [curves(found, near, far, LEARNING, seed) for seed in range(arguments.seeds)]
     print(table(runs, LEARNING.step))
     arguments.out.mkdir(parents=True, exist_ok=True)
-    draw(runs, LEARNING, f"FrozenLake 8×8, one move in ten slips, {len(runs)} runs", arguments.out / "frozenlake.png")
+    draw(
+        runs,
+        LEARNING.episodes,
+        LEARNING.step,
+        f"FrozenLake 8×8, one move in ten slips, {len(runs)} runs",
+        arguments.out / "frozenlake.png",
+    )
     print(f"the curves are in {arguments.out / 'frozenlake.png'}")
 
 
