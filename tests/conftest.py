@@ -1,12 +1,16 @@
-"""What all tests share: Hypothesis' profile, and one finished run of a tiny study."""
+"""What all tests share: Hypothesis' profile, one finished run of a tiny study, and a browser."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import settings
+
+from tests import browsers
 
 # the first call of a compiled kernel takes seconds; on a server the same cases are tried each time
 settings.register_profile("tickwise", deadline=None, derandomize="CI" in os.environ)
@@ -36,3 +40,10 @@ def studies(monkeypatch: pytest.MonkeyPatch) -> None:
 
     for name, study in tiny.STUDIES.items():
         monkeypatch.setitem(case_studies.STUDIES, name, study)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """A headless browser. It ends with each module: its event loop would get in the way of other tests' loops."""
+    with browsers.headless() as browser:
+        yield browser
