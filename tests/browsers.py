@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -90,6 +91,18 @@ def hard_to_read(page: Any, least: float = 4.5, within: str = "body") -> dict[st
         least,
     )
     return found
+
+
+def contrast(one: str, other: str) -> float:
+    """WCAG's contrast of two opaque colours, each as a browser computes it: ``rgb(1, 2, 3)``."""
+
+    def luminance(colour: str) -> float:
+        shares = [int(number) / 255 for number in re.findall(r"\d+", colour)]
+        linear = [share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4 for share in shares]
+        return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
 
 
 def too_wide(page: Any) -> list[str]:

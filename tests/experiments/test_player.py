@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.browsers import Open, hard_to_read, quiet_pages, too_wide
+from tests.browsers import Open, contrast, hard_to_read, quiet_pages, too_wide
 from tests.experiments import recorded, synthetic
 from tests.experiments.tiny import TINY
 from tickwise.automata.build import timed_automata
@@ -77,6 +78,8 @@ def watch(page: Any) -> list[dict[str, Any]]:
               locations: JSON.parse(player.dataset.locations),
               clocks: JSON.parse(player.dataset.clocks),
               verdicts: all(".lane-text[data-verdict]", (x) => Number(x.dataset.verdict)),
+              literals: all(".literal", (x) => ["is-false", "is-open", "is-true"].indexOf(x.classList[1]) - 1),
+              shown: all(".clock", (x) => x.textContent),
               current: all(".location.current .name", (x) => x.textContent),
               taken: all(".edge.taken", (x) => x.getAttribute("d")).length,
               lit: all(".region", (x) => x.classList.contains("lit")),
@@ -110,7 +113,7 @@ def test_the_automata_run_as_the_semantics_say(opened: Open, results: dict[str, 
             assert seen["locations"] == [own[tick].target for own in steps]
             assert seen["clocks"] == [list(own[tick].after) for own in steps]
             wanted = [int(verdict(part, path[: tick + 1], variables=mdp.variables)) for part in parts]
-            assert seen["verdicts"] == wanted
+            assert seen["verdicts"] == seen["literals"] == wanted
             said |= set(wanted)
     assert said == {-1, 0, 1}
 
@@ -123,12 +126,28 @@ def test_the_drawing_highlights_the_current_location(opened: Open, results: dict
     order = [followed, 1 - followed]  # the one that is followed stands first
     seen = set()
     for tick in watch(page):
+        clocks = [clock for number in order for clock in tick["clocks"][number]]
+        assert [int(text.split(" = ")[1]) for text in tick["shown"]] == clocks
         names = [automata[number].locations[tick["locations"][number]] for number in order]
         assert [name.translate(DIGITS) for name in tick["current"]] == names
         working = [name for name in names if name.startswith("q")]
         assert len(working) <= tick["taken"] <= len(names)
         seen.add(names[0])
     assert len(seen) > 1
+
+
+def test_no_label_of_an_automaton_covers_another(opened: Open):
+    page = opened()
+    choose(page, method="III")
+    for details in page.locator("details.automaton-box").all():
+        details.evaluate("details => { details.open = true; }")
+    for drawing in page.locator(".automaton").all():
+        boxes = drawing.locator(".guard").evaluate_all(
+            "texts => texts.map((text) => text.getBBox()).map((b) => [b.x, b.y, b.x + b.width, b.y + b.height])"
+        )
+        for one, other in combinations(boxes, 2):
+            across, down = (min(one[i + 2], other[i + 2]) - max(one[i], other[i]) for i in (0, 1))
+            assert across <= 0 or down <= 2, (one, other)  # lines of one label stand close
 
 
 def test_recorded_memory_is_where_the_player_is(finished: Path, opened: Open):
@@ -216,6 +235,12 @@ def test_keys_do_all_that_buttons_do(opened: Open):
     page = opened()
     player = page.locator(".player")
     player.focus()
+    page.keyboard.press("Tab")
+    page.keyboard.press("Shift+Tab")
+    for focused in ("Tab", "Tab", "Tab", "Tab", "Tab"):  # the player, its four choices, and the button beside
+        assert page.evaluate("parseFloat(getComputedStyle(document.activeElement).outlineWidth)") >= 2
+        page.keyboard.press(focused)
+    player.focus()
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowLeft")
@@ -286,7 +311,7 @@ def test_curves_tell_their_values_under_the_pointer(opened: Open):
 
 def test_curves_zoom_by_dragging_and_by_keys(opened: Open):
     page = opened()
-    plot, reset = page.locator(".plot").first, page.locator(".chart-head button").first
+    plot, reset = page.locator(".plot").first, page.get_by_role("button", name="Training: Reset zoom")
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
     before = plot.locator(".mean").first.get_attribute("d")
@@ -312,6 +337,12 @@ def test_curves_zoom_by_dragging_and_by_keys(opened: Open):
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     assert "27,000 episodes" in page.locator(".readout").first.text_content()
+    closer, further, reset = page.locator(".zooms").first.locator("button").all()
+    assert further.is_disabled()
+    closer.click()  # it zooms in where values are read
+    assert (plot.get_attribute("data-from"), plot.get_attribute("data-to")) == ("13500", "38500")
+    further.click()
+    assert reset.is_disabled()
     page.locator(".legend input").first.uncheck()
     assert plot.locator(".mean").count() == 3
 
@@ -338,6 +369,9 @@ def test_text_can_be_read_in_light_and_in_dark(opened: Open, scheme: str):
     for tick in (0, 20, 40):  # signs, clocks and regions change
         page.locator("[data-choose=tick]").fill(str(tick))
         assert hard_to_read(page) == {}
+    edges = page.locator(".region").evaluate_all("regions => regions.map((region) => getComputedStyle(region).stroke)")
+    floor = page.locator(".floor rect").evaluate("floor => getComputedStyle(floor).fill")
+    assert min(contrast(edge, floor) for edge in edges) >= 3  # what WCAG asks of graphics
 
 
 def test_on_paper_the_state_is_there_without_the_controls(opened: Open):

@@ -44,13 +44,15 @@ const VERDICTS = {
 const RADIUS = 22;
 const ROW = 102;
 const LINE_HEIGHT = 15;
+const LEAST = 0.78; // of its size: where there is less room the drawing scrolls, for smaller labels could not be read
 
 class AutomatonView {
   constructor(automaton) {
     this.automaton = automaton;
     const nested = automaton.parts.map((part) => part.operator.length === 2);
     const columns = automaton.parts.length;
-    this.step = nested.slice(1).some(Boolean) ? 330 : 225;
+    // labels on the left of a column need room, and more beside those on the right of the column before it
+    this.step = nested.slice(1).some((each, before) => each && nested[before]) ? 410 : nested.slice(1).some(Boolean) ? 330 : 225;
     const rows = automaton.locations.map(({ place }) => place[1]);
     const [lowest, highest] = [Math.min(...rows), Math.max(...rows)];
     const left = nested[0] ? 172 : 52;
@@ -64,9 +66,9 @@ class AutomatonView {
     const height = 80 + (highest - lowest) * ROW + RADIUS + 14;
     this.edges = new Map();
     this.circles = [];
-    const look = columns > 1 ? "automaton long" : "automaton";
-    this.element = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: look, role: "img" });
+    this.element = svg("svg", { viewBox: `0 0 ${width} ${height}`, class: "automaton", role: "img" });
     this.element.style.maxWidth = `${width}px`;
+    this.element.style.minWidth = `${LEAST * width}px`;
     this.title = svg("title");
     this.element.append(this.title, svg("defs", {}, ...["plain", "taken"].map((kind) => this.marker(kind))));
     this.drawEdges();

@@ -32,10 +32,19 @@ class Chart {
     this.view = this.full;
     const label = `${chart.title}: mean return over ${chart.unit}. Left and right arrow keys read values, plus and minus zoom, shift with arrows moves, 0 resets.`;
     this.plot = svg("svg", { class: "plot", role: "img", "aria-label": label, tabindex: 0 });
-    this.reset = html("button", { type: "button", disabled: true }, "Reset zoom");
-    this.reset.addEventListener("click", () => this.zoom(this.full));
+    const button = (text, label, action) => {
+      const made = html("button", { type: "button", "aria-label": `${chart.title}: ${label}`, title: label }, text);
+      made.addEventListener("click", action);
+      return made;
+    };
+    this.closer = button("+", "Zoom in", () => this.scaleView(0.5));
+    this.further = button("−", "Zoom out", () => this.scaleView(2));
+    this.reset = button("Reset", "Reset zoom", () => this.zoom(this.full));
+    const buttons = html("span", { class: "zooms" }, this.closer, this.further, this.reset);
+    [this.further.disabled, this.reset.disabled] = [true, true];
     this.readout = html("div", { class: "readout", "aria-live": "polite" });
-    const head = html("p", { class: "chart-head" }, html("strong", {}, chart.title), " ", html("span", { class: "note" }, `mean return by ${chart.unit}`), this.reset);
+    const name = html("span", {}, html("strong", {}, chart.title), " ", html("span", { class: "note" }, `mean return by ${chart.unit}`));
+    const head = html("p", { class: "chart-head" }, name, buttons);
     this.element = html("div", { class: "chart" }, head, this.plot, this.readout);
     this.plot.addEventListener("pointerdown", (event) => this.press(event));
     this.plot.addEventListener("pointermove", (event) => this.move(event));
@@ -135,7 +144,7 @@ class Chart {
     this.at = episodes;
     this.showCross();
     if (episodes === null) {
-      this.readout.replaceChildren(html("span", { class: "note" }, "Point at the curves, or focus them and press ← or →, to read values. Drag to zoom; double click resets."));
+      this.readout.replaceChildren(html("span", { class: "note" }, "Point at the curves, or focus them and press ← or →, to read values. Drag, or press + and −, to zoom."));
       return;
     }
     const rows = this.curves.flatMap(([name, curve]) => {
@@ -224,29 +233,42 @@ class Chart {
     const [low, high] = [Math.max(x[0], this.full.x[0]), Math.min(x[1], this.full.x[1])];
     if (high - low < least) return;
     this.view = { x: [low, high], y };
-    this.reset.disabled = low === this.full.x[0] && high === this.full.x[1] && y === this.full.y;
+    const whole = low === this.full.x[0] && high === this.full.x[1];
+    this.further.disabled = whole;
+    this.reset.disabled = whole && y === this.full.y;
+    this.closer.disabled = (high - low) / 2 < least;
     this.plot.dataset.from = Math.round(this.unscale(low));
     this.plot.dataset.to = Math.round(this.unscale(high));
     this.draw();
+  }
+
+  /** Where values are read, else the middle of the view, on the scale of the axis. */
+  get middle() {
+    const [low, high] = this.view.x;
+    return this.at === null ? (low + high) / 2 : clamp(this.scale(this.at), low, high);
+  }
+
+  /** Show so many times as many episodes as now, around those that are read. */
+  scaleView(factor) {
+    const { middle } = this;
+    this.zoom({ x: this.view.x.map((end) => middle + (end - middle) * factor), y: this.view.y });
   }
 
   key(event) {
     if (event.ctrlKey || event.metaKey || event.altKey) return;
     const [low, high] = this.view.x;
     const width = high - low;
-    const middle = this.at === null ? (low + high) / 2 : clamp(this.scale(this.at), low, high);
-    const closer = (factor) => () => this.zoom({ x: [middle - (middle - low) * factor, middle + (high - middle) * factor], y: this.view.y });
     const shift = (by) => () => {
       const moved = clamp(by * width, this.full.x[0] - low, this.full.x[1] - high);
       this.zoom({ x: [low + moved, high + moved], y: this.view.y });
     };
-    const step = (by) => () => this.read(this.unscale(clamp(middle + (by * width) / 50, low, high)));
+    const step = (by) => () => this.read(this.unscale(clamp(this.middle + (by * width) / 50, low, high)));
     const keys = {
       ArrowLeft: event.shiftKey ? shift(-0.25) : step(-1),
       ArrowRight: event.shiftKey ? shift(0.25) : step(1),
-      "+": closer(0.5),
-      "=": closer(0.5),
-      "-": closer(2),
+      "+": () => this.scaleView(0.5),
+      "=": () => this.scaleView(0.5),
+      "-": () => this.scaleView(2),
       0: () => this.zoom(this.full),
       Escape: () => this.zoom(this.full),
     };

@@ -105,6 +105,7 @@ class Player {
     this.task = this.data.tasks[this.method.task];
     this.formula = this.method.formula && this.data.formulas[this.method.formula];
     this.offer("method", this.data.methods.map(({ title }) => title));
+    this.find("choose", "method").title = this.method.title; // a narrow screen cuts it off
     this.offer("run", this.method.runs.map(({ run }) => run));
     this.offer("point", this.points.map(({ learned, mean }) =>
       `${numberText(learned)} episodes (mean return ${numberText(mean, 1)})`));
@@ -162,6 +163,7 @@ class Player {
       if (number === this.followed) return html("div", { class: "automaton-box" }, ...parts);
       return html("details", { class: "automaton-box" }, html("summary", {}, `The automaton of disjunct ${number + 1}`), ...parts);
     });
+    if (automata.length) timeline.finish(this.formula.symbol, automata.map(({ parts }) => parts));
     if (panels.length) panels.unshift(...panels.splice(this.followed, 1));
     const observer = html("p", { class: "note" }, "Method I does not know this automaton; it only looks on.");
     const missing = html("p", { class: "missing" }, "No formula was inferred, so there is no automaton.");
@@ -255,7 +257,9 @@ class Player {
 
   /** What the robot did to get here. */
   deed() {
-    if (!this.tick) return "The episode begins.";
+    const within = this.world.within(this.tick);
+    const where = within.length ? ` The robot is in ${within.join(" and ")}.` : "";
+    if (!this.tick) return `The episode begins.${where}`;
     const [before, now] = [this.tick - 1, this.tick].map((at) => placeOf(this.episode.states[at], this.task.size));
     const action = this.episode.actions[this.tick - 1];
     const [dx, dy] = [now.i - before.i, now.j - before.j];
@@ -265,7 +269,7 @@ class Player {
     if (action === 0 && side) how = `, and slipped to the ${side > 0 ? "left" : "right"}`;
     else if (action === 0 && !ahead) how = ", and stayed at the wall";
     else if (action > 0 && now.heading === before.heading) how = ", and the turn failed";
-    return `Action: ${this.data.actions[action]}${how}.`;
+    return `Action: ${this.data.actions[action]}${how}.${where}`;
   }
 
   now() {

@@ -4,6 +4,7 @@ class Timeline {
   constructor(deadline, choose) {
     this.ticks = deadline + 1;
     this.lanes = [];
+    this.literals = [];
     this.element = html("div", { class: "lanes" });
     const drag = (event) => {
       if (event.type === "pointermove" && !event.buttons) return;
@@ -23,11 +24,13 @@ class Timeline {
     return { strip: svg("svg", box, ground, ...marks, cursor), cursor };
   }
 
-  cells(kinds) {
+  /** A cell for each tick of some kind; outside of the window, where nothing depends on it, a low one. */
+  cells(kinds, [from, to] = [0, Infinity]) {
     return kinds.flatMap((kind, tick) => {
       if (!kind) return [];
       const looks = kind.startsWith("#") ? { fill: kind, class: "cell" } : { class: `cell ${kind}` };
-      return [svg("rect", { x: tick, y: 0, width: 1, height: 1, ...looks })];
+      const height = tick >= from && tick <= to ? 1 : 0.25;
+      return [svg("rect", { x: tick, y: 1 - height, width: 1, height, ...looks })];
     });
   }
 
@@ -51,11 +54,14 @@ class Timeline {
   addPart(part, holding) {
     const [from, to] = [part.window[0], part.window[1] + part.duration];
     const frame = svg("rect", { x: from, y: 0, width: to - from + 1, height: 1, class: "window" });
-    const cells = this.cells(holding.map((holds) => (holds ? "holds" : null)));
+    const cells = this.cells(holding.map((holds) => (holds ? "holds" : null)), [from, to]);
     const { strip, cursor } = this.strip([frame, ...cells]);
     const sign = html("span", { class: "sign" });
     const word = html("span", { class: "word" });
     const english = html("span", { class: "note" }, part.english);
+    const literal = { sign: html("span", { "aria-hidden": "true" }), element: html("span") };
+    literal.element.append(literal.sign, part.text);
+    this.literals.push(literal.element);
     this.element.append(
       html("div", { class: "lane" }, html("p", { class: "lane-text" }, sign, part.text, " ", word, english), strip),
     );
@@ -64,7 +70,26 @@ class Timeline {
       this.mark(sign, verdict);
       word.textContent = VERDICTS[verdict].word;
       sign.parentNode.dataset.verdict = verdict;
+      literal.sign.textContent = VERDICTS[verdict].sign;
+      literal.element.className = `literal ${VERDICTS[verdict].kind}`;
     } });
+  }
+
+  /** Above the lanes the formula, whose parts turn true or false; below them what their colours mean. */
+  finish(symbol, disjuncts) {
+    const rest = [...this.literals];
+    const line = disjuncts.flatMap((parts, number) => {
+      const conjunction = rest.splice(0, parts.length).flatMap((literal, index) => (index ? [" ∧ ", literal] : [literal]));
+      const enclosed = disjuncts.length > 1 && parts.length > 1 ? ["( ", ...conjunction, " )"] : conjunction;
+      return number ? [" ∨ ", ...enclosed] : enclosed;
+    });
+    this.element.prepend(html("p", { class: "parts" }, `${symbol} = `, ...line));
+    const sample = (kind, text) => {
+      const box = svg("svg", { viewBox: "0 0 20 10", "aria-hidden": "true" }, svg("rect", { width: 20, height: 10, class: kind }));
+      return html("span", {}, box, ` ${text}`);
+    };
+    const [holds, window] = [sample("cell holds", "what a part asks of the state holds"), sample("window", "ticks that it looks at; lanes are low elsewhere")];
+    this.element.append(html("p", { class: "note lane-key" }, holds, window, sample("cell holds ahead", "still to come")));
   }
 
   mark(sign, verdict) {

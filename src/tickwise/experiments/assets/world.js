@@ -69,7 +69,13 @@ class WorldView {
 
   region({ name, rectangle, colour, cells }) {
     const frame = this.frame(rectangle);
-    const label = svg("text", { x: frame.x + 5, y: frame.y + 17, class: "region-name" }, name);
+    let place = { x: frame.x + 5, y: frame.y + 17 };
+    if (Math.min(frame.width, frame.height) < 2 * CELL) { // the robot would hide it
+      const y = frame.y + frame.height / 2 + 5;
+      const left = rectangle[0] >= 1;
+      place = { x: left ? frame.x - 6 : frame.x + frame.width + 6, y, "text-anchor": left ? "end" : "start" };
+    }
+    const label = svg("text", { ...place, class: "region-name" }, name);
     return { cells, name: label, group: svg("rect", { ...frame, class: `region ${colour}` }) };
   }
 
@@ -91,6 +97,11 @@ class WorldView {
     return path.map(({ i, j }) => `${this.x(i + 0.5)},${this.y(j + 0.5)}`).join(" ");
   }
 
+  /** The names of the regions that the robot is in. */
+  within(tick) {
+    return this.regions.filter(({ cells }) => cells[this.path[tick].cell] === "1").map(({ name }) => name.textContent);
+  }
+
   show(tick, headings) {
     const { i, j, heading, cell } = this.path[tick];
     this.trail.setAttribute("points", this.points(this.path.slice(0, tick + 1)));
@@ -99,13 +110,12 @@ class WorldView {
     this.turned = before + ((((heading - before) % 4) + 6) % 4) - 2;
     const turn = `rotate(${-90 * this.turned}deg)`;
     this.robot.style.transform = `translate(${this.x(i + 0.5)}px, ${this.y(j + 0.5)}px) ${turn}`;
-    const within = [];
     for (const { cells, group, name } of this.regions) {
       const lit = cells[cell] === "1";
       group.classList.toggle("lit", lit);
       name.classList.toggle("lit", lit);
-      if (lit) within.push(name.textContent);
     }
+    const within = this.within(tick);
     const where = within.length ? `, in ${within.join(" and ")}` : "";
     this.title.textContent = `World of ${this.size} by ${this.size} cells; the robot is in cell (${i}, ${j}), facing ${headings[heading]}${where}`;
   }
