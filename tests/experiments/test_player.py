@@ -1,24 +1,18 @@
-"""The report in a real browser: the player, the curves, keys, phones, dark rooms and paper."""
+"""The player in a real browser: what it shows is what was recorded, and what a reader can do with it."""
 
 from __future__ import annotations
 
-import json
 import re
-from collections.abc import Iterator
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import pytest
-
-from tests.browsers import Open, contrast, hard_to_read, quiet_pages, too_wide
+from tests.browsers import Open
 from tests.experiments import recorded, synthetic
+from tests.experiments.playing import choose, told
 from tests.experiments.tiny import TINY
 from tickwise.automata.build import timed_automata
 from tickwise.automata.run import EdgeStep, run
 from tickwise.envs.gridworld import HEADINGS
-from tickwise.experiments.figures import FIGURES
 from tickwise.experiments.jobs import learning_problem
 from tickwise.experiments.recording import PREFIX
 from tickwise.experiments.report import render_report
@@ -29,37 +23,6 @@ from tickwise.logic.semantics import verdict
 
 SPEC = synthetic.small()
 DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
-SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 5"><path d="M0 0"/></svg>'
-
-
-@pytest.fixture(scope="module")
-def results() -> dict[str, Any]:
-    return recorded.results(SPEC)
-
-
-@pytest.fixture(scope="module")
-def report(results: dict[str, Any], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render_report(results, SPEC, dict.fromkeys(FIGURES, SVG)), encoding="utf-8")
-    return path
-
-
-@pytest.fixture
-def opened(browser: Any, report: Path) -> Iterator[Open]:
-    """Opens the report, or another page."""
-    with quiet_pages(browser) as open_page:
-        yield lambda path=report, **options: open_page(path, **options)
-
-
-def choose(page: Any, **choices: str) -> None:
-    for name, label in choices.items():
-        select = page.locator(f"[data-choose={name}]")
-        texts = select.locator("option").all_text_contents()
-        select.select_option(index=next(i for i, text in enumerate(texts) if text.startswith(label)))
-
-
-def told(page: Any, name: str) -> Any:
-    return json.loads(page.locator(".player").get_attribute(f"data-{name}"))
 
 
 def watch(page: Any) -> list[dict[str, Any]]:
@@ -134,20 +97,6 @@ def test_the_drawing_highlights_the_current_location(opened: Open, results: dict
         assert len(working) <= tick["taken"] <= len(names)
         seen.add(names[0])
     assert len(seen) > 1
-
-
-def test_no_label_of_an_automaton_covers_another(opened: Open):
-    page = opened()
-    choose(page, method="III")
-    for details in page.locator("details.automaton-box").all():
-        details.evaluate("details => { details.open = true; }")
-    for drawing in page.locator(".automaton").all():
-        boxes = drawing.locator(".guard").evaluate_all(
-            "texts => texts.map((text) => text.getBBox()).map((b) => [b.x, b.y, b.x + b.width, b.y + b.height])"
-        )
-        for one, other in combinations(boxes, 2):
-            across, down = (min(one[i + 2], other[i + 2]) - max(one[i], other[i]) for i in (0, 1))
-            assert across <= 0 or down <= 2, (one, other)  # lines of one label stand close
 
 
 def test_recorded_memory_is_where_the_player_is(finished: Path, opened: Open):
@@ -235,12 +184,6 @@ def test_keys_do_all_that_buttons_do(opened: Open):
     page = opened()
     player = page.locator(".player")
     player.focus()
-    page.keyboard.press("Tab")
-    page.keyboard.press("Shift+Tab")
-    for focused in ("Tab", "Tab", "Tab", "Tab", "Tab"):  # the player, its four choices, and the button beside
-        assert page.evaluate("parseFloat(getComputedStyle(document.activeElement).outlineWidth)") >= 2
-        page.keyboard.press(focused)
-    player.focus()
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowLeft")
@@ -291,116 +234,6 @@ def test_the_scrubber_and_the_lanes_choose_the_tick(opened: Open):
     box = lane.bounding_box()
     lane.click(position={"x": box["width"] * 25.5 / 41, "y": 5})
     assert told(page, "tick") == 25
-
-
-def test_curves_tell_their_values_under_the_pointer(opened: Open):
-    page = opened()
-    plot = page.locator(".plot").first
-    plot.scroll_into_view_if_needed()
-    box = plot.bounding_box()
-    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-    text = page.locator(".readout").first.text_content()
-    episodes = int(re.match(r"([\d,]+) episodes", text)[1].replace(",", ""))
-    data = json.loads(page.locator(".live-curves + script").text_content())
-    curve = data["charts"][0]["levels"][0]["IV"]
-    index = int(np.argmin(np.abs(np.array(curve["x"]) - episodes)))
-    mean, low, high = (f"{curve[name][index]:g}".replace("-", "−") for name in ("mean", "low", "high"))
-    assert f"IV: {mean} [{low}, {high}]" in text
-    assert page.locator(".plot").first.locator(".dot").count() == 4
-
-
-def test_curves_zoom_by_dragging_and_by_keys(opened: Open):
-    page = opened()
-    plot, reset = page.locator(".plot").first, page.get_by_role("button", name="Training: Reset zoom")
-    plot.scroll_into_view_if_needed()
-    box = plot.bounding_box()
-    before = plot.locator(".mean").first.get_attribute("d")
-    page.mouse.move(box["x"] + 100, box["y"] + 60)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 180, box["y"] + 65)
-    assert plot.locator(".selection").get_attribute("visibility") == "visible"
-    page.mouse.up()
-    first, last = (int(plot.get_attribute(f"data-{end}")) for end in ("from", "to"))
-    assert 0 < first < last < 50_000
-    assert plot.locator(".mean").first.get_attribute("d") != before
-    reset.click()
-    assert (plot.get_attribute("data-from"), plot.get_attribute("data-to")) == ("0", "50000")
-    assert reset.is_disabled()
-    plot.focus()
-    page.keyboard.press("+")
-    assert int(plot.get_attribute("data-to")) < 50_000
-    inner = int(plot.get_attribute("data-from"))
-    page.keyboard.press("Shift+ArrowRight")
-    assert int(plot.get_attribute("data-from")) > inner
-    page.keyboard.press("0")
-    assert plot.get_attribute("data-to") == "50000"
-    page.keyboard.press("ArrowRight")
-    page.keyboard.press("ArrowRight")
-    assert "27,000 episodes" in page.locator(".readout").first.text_content()
-    closer, further, reset = page.locator(".zooms").first.locator("button").all()
-    assert further.is_disabled()
-    closer.click()  # it zooms in where values are read
-    assert (plot.get_attribute("data-from"), plot.get_attribute("data-to")) == ("13500", "38500")
-    further.click()
-    assert reset.is_disabled()
-    page.locator(".legend input").first.uncheck()
-    assert plot.locator(".mean").count() == 3
-
-
-@pytest.mark.parametrize("study", ["case", "tiny"])
-def test_a_phone_shows_it_without_scrolling_sideways(opened: Open, finished: Path, study: str, report: Path):
-    path = report if study == "case" else finished / "report.html"
-    page = opened(path, viewport={"width": 360, "height": 740}, has_touch=True, is_mobile=True)
-    page.locator("[data-do=forth]").tap()
-    assert told(page, "tick") == 1
-    assert too_wide(page) == []
-    for button in page.locator(".transport button").all():
-        box = button.bounding_box()
-        assert min(box["width"], box["height"]) >= 40
-        assert box["x"] + box["width"] <= 360
-    assert page.locator(".map").bounding_box()["width"] > 280
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_text_can_be_read_in_light_and_in_dark(opened: Open, scheme: str):
-    page = opened(color_scheme=scheme)
-    light = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-    assert light == (scheme == "light")
-    for tick in (0, 20, 40):  # signs, clocks and regions change
-        page.locator("[data-choose=tick]").fill(str(tick))
-        assert hard_to_read(page) == {}
-    edges = page.locator(".region").evaluate_all("regions => regions.map((region) => getComputedStyle(region).stroke)")
-    floor = page.locator(".floor rect").evaluate("floor => getComputedStyle(floor).fill")
-    assert min(contrast(edge, floor) for edge in edges) >= 3  # what WCAG asks of graphics
-
-
-def test_on_paper_the_state_is_there_without_the_controls(opened: Open):
-    page = opened()
-    page.locator("[data-do=last]").click()
-    page.emulate_media(media="print")
-    for hidden in (".choices", ".controls", ".keys", ".live-curves", "nav"):
-        assert not page.locator(hidden).first.is_visible(), hidden
-    for shown in (".map", ".automaton", ".lane", "#curves .picture", ".on-paper"):
-        assert page.locator(shown).first.is_visible(), shown
-    assert page.locator(".on-paper").text_content().startswith("III: extended states of φᵀ; run 1, after 1,000 learned")
-    assert len(page.pdf()) > 10_000
-
-
-def test_motion_is_left_out_where_it_is_not_wanted(opened: Open):
-    page = opened(reduced_motion="reduce")
-    assert page.locator(".robot").evaluate("x => getComputedStyle(x).transitionDuration") == "0s"
-    page = opened()
-    assert page.locator(".robot").evaluate("x => getComputedStyle(x).transitionDuration") != "0s"
-
-
-def test_without_scripts_the_page_says_so_and_shows_the_figures(browser: Any, report: Path):
-    context = browser.new_context(java_script_enabled=False)
-    page = context.new_page()
-    page.goto(report.as_uri())
-    assert page.get_by_text("Playing needs JavaScript").is_visible()
-    assert page.locator("#curves .picture").is_visible()
-    assert not page.locator(".player").is_visible()
-    context.close()
 
 
 def test_old_recordings_are_missed_in_words(opened: Open, tmp_path: Path):
