@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tickwise.inference import drawing
+from tickwise.inference import drawing, plane
 from tickwise.inference.explanation import explain
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.parse import parse
@@ -40,12 +40,71 @@ def test_a_mark_spans_window_and_range(ramp):
     assert mark.outside
     assert mark.name == "1 ◇□¬"
     tick = (drawing.RIGHT - drawing.LEFT) / 10
-    assert mark.x == pytest.approx(drawing.LEFT + tick * (2 - 0.35), abs=0.051)
-    assert mark.x + mark.width == pytest.approx(drawing.LEFT + tick * (7 + 0.35), abs=0.11)
+    assert mark.frame.x == pytest.approx(drawing.LEFT + tick * (2 - 0.35), abs=0.051)
+    assert mark.frame.x + mark.frame.width == pytest.approx(drawing.LEFT + tick * (7 + 0.35), abs=0.11)
     assert mark.rest == pytest.approx(drawing.LEFT + tick * (4 + 0.35), abs=0.051)
-    assert mark.y + mark.height == pytest.approx(drawing.BOTTOM, abs=0.051)  # the lower side is open
+    assert mark.frame.y + mark.frame.height == pytest.approx(drawing.BOTTOM, abs=0.051)  # the lower side is open
     unit = (drawing.BOTTOM - drawing.TOP) / 10.8
-    assert mark.y == pytest.approx(drawing.BOTTOM - unit * 2.4, abs=0.051)
+    assert mark.frame.y == pytest.approx(drawing.BOTTOM - unit * 2.4, abs=0.051)
+
+
+def test_no_line_closes_a_range_that_has_no_end(ramp):
+    [panel] = panels("F[2,4] (x <= 2) & F[5,6] (3 <= x <= 4)", ramp)
+    open_below, closed = panel.marks
+    assert closed.frame.edges.count("M") == 4
+    left, top, right = open_below.frame.x, open_below.frame.y, open_below.frame.x + open_below.frame.width
+    assert open_below.frame.edges.count("M") == 3
+    assert f"M{left:g} {top:g}H{right:g}" in open_below.frame.edges
+
+
+def test_a_ring_is_where_a_trajectory_first_leaves_what_it_may_not_leave():
+    path = np.array([[0.0, 0.0], [1.0, 5.0], [4.0, 6.0], [5.0, 0.0]])
+    data = LabelledTrajectories.from_arrays([path, path], [1, -1], ("x", "y"))
+    for formula, ticks_x, ticks_y in (
+        ("G[0,3] (x <= 3 & y <= 7)", [2], []), ("G[0,3] (x <= 3 & y <= 4)", [], [1]),
+        ("G[1,3] !(x >= 4)", [2], []), ("F[0,1] (x >= 3)", [], []), ("G[3,9] (y >= 1)", [], [3]),
+    ):  # fmt: skip
+        for panel, ticks in zip(panels(formula, data, variables=("x", "y")), (ticks_x, ticks_y), strict=True):
+            [line] = panel.lines
+            points = [tuple(map(float, point.split(","))) for point in line.points.split()]
+            assert list(line.breaks) == [points[tick] for tick in ticks], formula
+
+
+def test_names_stand_beside_the_axes_in_the_order_of_the_lines():
+    ends = [5.0, 5.1, 0.0, 9.0, 5.05]
+    data = LabelledTrajectories.from_arrays(
+        [np.linspace(3, end, 5)[:, None] for end in ends], [1, 1, -1, -1, 1], ("x",), ids=["a", "b", "c", "d", "e"]
+    )
+    found = explain(parse("F[0,4] (x >= 3)"), data)
+    [panel] = drawing.draw(found, data, np.arange(5), ["x"], named=True)
+    assert panel.right == drawing.RIGHT - 8
+    lines = sorted(panel.lines, key=lambda line: line.place[1])
+    assert [line.name for line in lines] == ["d", "b", "e", "a", "c"]
+    assert all(line.beside for line in lines)
+    levels = [line.place[1] for line in lines]
+    assert min(np.diff(levels)) >= 13.9
+    assert levels[-1] <= drawing.BOTTOM + 4
+
+
+def test_a_plane_has_the_states_of_the_window_over_the_region():
+    paths = np.array([[[0, 0], [1, 2], [2, 4], [3, 6]], [[9, 9], [9, 8], [9, 7], [9, 6]]], dtype=float)
+    data = LabelledTrajectories.from_arrays(paths, [1, -1], ("x", "y"), ids=["up", "down"])
+    found = explain(parse("F[1,2] (1 <= x <= 2 & y >= 3) & G[3,3] (x <= 5)"), data)
+    first, second = plane.planes(found, data, np.array([0, 1]))
+    assert (first.name, first.variables) == ("1", ("x", "y"))
+    assert [(way.name, way.label, len(way.points.split())) for way in first.ways] == [("down", -1, 2), ("up", 1, 2)]
+    assert first.frame.edges.count("M") == 3  # y has no upper end
+    assert first.ways[1].points.split()[0].split(",")[0] == f"{first.frame.x:g}"  # x = 1, its left side
+    assert second.frame.edges.count("M") == 1
+    assert second.frame.height == plane.BOTTOM - plane.TOP
+    assert [len(way.points.split()) for way in second.ways] == [1, 1]
+
+
+def test_a_primitive_of_one_variable_among_three_has_no_plane():
+    data = LabelledTrajectories.from_arrays(np.random.default_rng(0).random((2, 4, 3)), [1, -1], ("x", "y", "z"))
+    found = explain(parse("F[0,1] (x >= 0.5) & F[2,3] (z >= 0.5 & y >= 0.1)"), data)
+    [only] = plane.planes(found, data, np.array([0]))
+    assert (only.name, only.variables) == ("2", ("z", "y"))
 
 
 def test_marks_belong_to_their_variable_and_names_do_not_cover_each_other():

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tickwise._seeding import generator
 from tickwise.errors import FormulaError
+from tickwise.inference.axis import Axis, Frame, Tick
 from tickwise.inference.explanation import Explanation
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.logic.sdnf import Primitive, to_sdnf
-from tickwise.logic.syntax import Bound, Formula
+from tickwise.logic.sdnf import Operator, Primitive, to_sdnf
+from tickwise.logic.semantics import holds
+from tickwise.logic.syntax import Bound, Box, Formula
 
 WIDTH, HEIGHT = 600, 290
 LEFT, RIGHT, TOP, BOTTOM = 50, 590, 8, 252
@@ -36,12 +38,16 @@ class Line:
         label: Its label, 1 or -1.
         points: Its states as SVG has points.
         place: Where its name has room, near its last state.
+        beside: Whether that is beside the axes, where the name ends rather than begins.
+        breaks: Where it first leaves what it may never leave: the states that violate a part with □.
     """
 
     name: str
     label: int
     points: str
     place: tuple[float, float]
+    beside: bool
+    breaks: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,30 +57,16 @@ class Mark:
     Attributes:
         name: Name and operator of the primitive.
         outside: Whether the predicate is the complement: the state is to be outside the box.
-        x: Left end.
-        y: Upper end.
-        width: Along time.
-        height: Along values.
+        frame: Where it is.
         rest: Where the outer window ends and only the inner one goes on, if the operator is nested.
         place: Where its name has room, at its upper left corner.
     """
 
     name: str
     outside: bool
-    x: float
-    y: float
-    width: float
-    height: float
+    frame: Frame
     rest: float | None
     place: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True)
-class Tick:
-    """A tick of an axis: where it is, and what it says."""
-
-    place: float
-    text: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +79,7 @@ class Panel:
         marks: What the primitives look at.
         across: Ticks of the axis of time.
         up: Ticks of the axis of values.
+        right: Where the axis of time ends.
     """
 
     variable: str
@@ -94,6 +87,7 @@ class Panel:
     marks: tuple[Mark, ...]
     across: tuple[Tick, ...]
     up: tuple[Tick, ...]
+    right: float
 
 
 def primitive_of(part: Formula) -> Primitive | None:
@@ -118,7 +112,12 @@ def sample(data: LabelledTrajectories, most: int) -> NDArray[np.int64]:
 
 
 def draw(
-    found: Explanation, data: LabelledTrajectories, rows: NDArray[np.int64], variables: Iterable[str]
+    found: Explanation,
+    data: LabelledTrajectories,
+    rows: NDArray[np.int64],
+    variables: Iterable[str],
+    *,
+    named: bool = False,
 ) -> tuple[Panel, ...]:
     """Draw trajectories, a panel a variable.
 
@@ -127,19 +126,32 @@ def draw(
         data: All trajectories; they and the formula say what range the axes have.
         rows: Which of them to draw.
         variables: Which variables to draw.
+        named: Whether to leave room beside the axes for the trajectories' names.
 
     Returns:
         The panels.
     """
+    known = named_primitives(found)
+    longest = max((len(data.ids[row]) for row in rows), default=0) if named else 0
+    right = RIGHT - _LETTER * min(longest, LONGEST_NAME)
+    return tuple(_panel(variable, known, data, rows, right) for variable in variables)
+
+
+def named_primitives(found: Explanation) -> tuple[tuple[str, Primitive], ...]:
+    """Those parts of a formula that are primitives, with their names."""
     primitives = [(each.name, primitive_of(each.formula)) for each in found.separations]
     known = [(name, primitive) for name, primitive in primitives if primitive is not None]
     if len({separation.disjunct for separation in found.separations}) < 2:  # “1.2” says no more than “2” then
         known = [(name.partition(".")[2], primitive) for name, primitive in known]
-    return tuple(_panel(variable, known, data, rows) for variable in variables)
+    return tuple(known)
 
 
 def _panel(
-    variable: str, known: Sequence[tuple[str, Primitive]], data: LabelledTrajectories, rows: NDArray[np.int64]
+    variable: str,
+    known: Sequence[tuple[str, Primitive]],
+    data: LabelledTrajectories,
+    rows: NDArray[np.int64],
+    right: float,
 ) -> Panel:
     states = data.values[..., data.variables.index(variable)]
     bounds = [
@@ -148,51 +160,61 @@ def _panel(
         for bound in primitive.box.bounds
         if bound.variable == variable
     ]
-    scale = _Scale.of(states, data.horizon, [bound for _, _, bound in bounds])
+    time = Axis(0, max(data.horizon, 1), LEFT, right)
+    axis = Axis.around(states, [side for *_, bound in bounds for side in (bound.lower, bound.upper)], BOTTOM, TOP)
     order = rows[np.argsort(data.labels[rows], kind="stable")].tolist()
-    names = _Names()
-    marks = tuple(_mark(name, primitive, bound, scale, names) for name, primitive, bound in bounds)
-    lines = tuple(_line(row, states[row, : data.lengths[row]], data, scale, names) for row in order)
-    across = tuple(Tick(scale.x(tick), f"{tick:g}") for tick in _steps(0, scale.last, 8, whole=True))
-    up = tuple(Tick(scale.y(value), f"{value:g}") for value in _steps(scale.low, scale.high, 6))
-    return Panel(variable, lines, marks, across, up)
+    names = _Names(right)
+    beside = _apart([axis.place(float(states[row, data.lengths[row] - 1])) for row in order])
+    marks = tuple(_mark(name, primitive, bound, time, axis, names) for name, primitive, bound in bounds)
+    lines = []
+    for row, level in zip(order, beside, strict=True):
+        path = states[row, : data.lengths[row]]
+        places = [(time.place(tick), axis.place(value)) for tick, value in enumerate(path.tolist())]
+        x, y = places[-1]
+        outside = right < RIGHT and x == right
+        width = _LETTER * min(len(data.ids[row]), LONGEST_NAME)
+        place = (WIDTH - 2.0, level + 4) if outside else names.place(x - width, y - 5, width)
+        breaks = tuple(
+            places[tick] for tick in _breaks(row, [(primitive, bound) for _, primitive, bound in bounds], data)
+        )
+        points = " ".join(f"{x:g},{y:g}" for x, y in places)
+        lines.append(Line(data.ids[row], int(data.labels[row]), points, place, outside, breaks))
+    return Panel(variable, tuple(lines), marks, time.ticks(8, whole=True), axis.ticks(6), right)
 
 
-@dataclass(frozen=True, slots=True)
-class _Scale:
-    """From ticks and values to the units of the drawing."""
+def _breaks(row: int, bounds: Iterable[tuple[Primitive, Bound]], data: LabelledTrajectories) -> list[int]:
+    """The first tick at which a trajectory is not where it should always be, if the bound has a part in that."""
+    ticks = set()
+    for primitive, bound in bounds:
+        if primitive.operator == Operator.ALWAYS:
+            states = data.values[row, primitive.start : min(primitive.end + 1, int(data.lengths[row]))]
+            wrong = np.flatnonzero(~holds(primitive.predicate, states, data.variables))[:1]
+            inside = holds(Box((bound,)), states[wrong], data.variables)
+            ticks |= {primitive.start + int(tick) for tick in wrong[inside == primitive.complemented]}
+    return sorted(ticks)
 
-    last: int
-    low: float
-    high: float
 
-    @classmethod
-    def of(cls, states: NDArray[np.float64], horizon: int, bounds: Sequence[Bound]) -> _Scale:
-        """The scale on which all states and all sides of boxes can be seen."""
-        sides = [side for bound in bounds for side in (bound.lower, bound.upper) if math.isfinite(side)]
-        low, high = min([float(np.nanmin(states)), *sides]), max([float(np.nanmax(states)), *sides])
-        room = 0.04 * (high - low) or max(abs(high), 1.0) * 0.1
-        return cls(max(horizon, 1), low - room, high + room)
-
-    def x(self, tick: float) -> float:
-        """Where a tick is, within the axes."""
-        return round(min(max(LEFT + (RIGHT - LEFT) * tick / self.last, LEFT), RIGHT), 1)
-
-    def y(self, value: float) -> float:
-        """Where a value is, within the axes."""
-        share = (min(max(value, self.low), self.high) - self.low) / (self.high - self.low)
-        return round(BOTTOM - (BOTTOM - TOP) * share, 1)
+def _apart(levels: Sequence[float]) -> list[float]:
+    """Levels in the same order from top to bottom, but a line of text apart and above the end of the axis."""
+    order = np.argsort(levels, kind="stable").tolist()
+    found = np.array(levels, dtype=np.float64)
+    for above, below in pairwise(order):
+        found[below] = max(found[below], found[above] + _LINE)
+    for below, above in pairwise([None, *reversed(order)]):
+        found[above] = min(found[above], BOTTOM if below is None else found[below] - _LINE)
+    return [round(float(level), 1) for level in found]
 
 
 class _Names:
     """Finds room for names: each goes down, and at the bottom up, until it covers no other."""
 
-    def __init__(self) -> None:
+    def __init__(self, right: float) -> None:
+        self._right = right
         self._taken: list[tuple[float, float, float]] = []
 
     def place(self, x: float, y: float, width: float) -> tuple[float, float]:
         """Room for a name of some width, as near as may be to where its left end should be."""
-        x = min(max(x, LEFT + 2), RIGHT - width)
+        x = min(max(x, LEFT + 2), self._right - width)
         downward = [y + step * _LINE for step in range(int((BOTTOM - TOP) / _LINE))]
         upward = [y - step * _LINE for step in range(int((BOTTOM - TOP) / _LINE))]
         inside = [place for place in (*downward, *upward) if TOP + 10 <= place <= BOTTOM - 3]
@@ -206,29 +228,10 @@ class _Names:
         return abs(y - other[1]) >= _LINE or x >= other[0] + other[2] or other[0] >= x + width
 
 
-def _line(row: int, states: NDArray[np.float64], data: LabelledTrajectories, scale: _Scale, names: _Names) -> Line:
-    places = [(scale.x(tick), scale.y(value)) for tick, value in enumerate(states.tolist())]
-    points = " ".join(f"{x:g},{y:g}" for x, y in places)
-    x, y = places[-1]
-    width = _LETTER * min(len(data.ids[row]), LONGEST_NAME)
-    return Line(data.ids[row], int(data.labels[row]), points, names.place(x - width, y - 5, width))
-
-
-def _mark(name: str, primitive: Primitive, bound: Bound, scale: _Scale, names: _Names) -> Mark:
-    first, last = scale.x(primitive.start - _HALF), scale.x(primitive.end + _HALF)
-    top, bottom = scale.y(bound.upper), scale.y(bound.lower)
-    rest = scale.x(primitive.window.end + _HALF) if primitive.operator.nested else None
+def _mark(name: str, primitive: Primitive, bound: Bound, time: Axis, axis: Axis, names: _Names) -> Mark:
+    window = primitive.start - _HALF, primitive.end + _HALF
+    frame = Frame.of(time, window, axis, (bound.lower, bound.upper))
+    rest = time.place(primitive.window.end + _HALF) if primitive.operator.nested else None
     shown = f"{name} {primitive.operator.symbol}{'¬' if primitive.complemented else ''}"
-    width, height = round(last - first, 1), round(bottom - top, 1)
-    place = names.place(first + 5, top + 15 if height > 18 else top - 4, _LETTER * len(shown))
-    return Mark(shown, primitive.complemented, first, top, width, height, rest, place)
-
-
-def _steps(low: float, high: float, most: int, *, whole: bool = False) -> list[float]:
-    """Round numbers between two, at most so many, at equal distances of 1, 2 or 5 times a power of ten."""
-    least = (high - low) / most
-    power = 10.0 ** math.floor(math.log10(least))
-    step = next(factor * power for factor in (1, 2, 5, 10, 20) if factor * power >= least * (1 - 1e-9))
-    step = max(step, 1.0) if whole else step
-    numbers = range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)
-    return [round(number * step, 12) for number in numbers]
+    below = frame.y + 15 if frame.height > 18 else frame.y - 4
+    return Mark(shown, primitive.complemented, frame, rest, names.place(frame.x + 5, below, _LETTER * len(shown)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, astuple, dataclass
 from functools import reduce
 from typing import Any
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.inference.trajectories import LabelledTrajectories
-from tickwise.logic.render import to_english, to_text
+from tickwise.logic.render import to_english, to_text, to_unicode
 from tickwise.logic.syntax import And, Formula, Or, Verdict
 
 
@@ -118,6 +118,7 @@ class Mistake:
         label: Its label.
         predicted: The other one.
         why: Which parts of the formula are to blame, in words.
+        symbols: The same with the formula's symbols, for a page.
     """
 
     row: int
@@ -125,6 +126,7 @@ class Mistake:
     label: int
     predicted: int
     why: str
+    symbols: str
 
     def document(self) -> dict[str, Any]:
         """The facts, as JSON has them."""
@@ -185,9 +187,8 @@ def explain(formula: Formula | None, data: LabelledTrajectories) -> Explanation:
     if formula is None:
         predicted = np.full(len(data), -1, dtype=np.int8)
         why = "no formula was found, so all are predicted -1"
-        return Explanation(
-            None, "", predicted, Confusion.of(data.labels, predicted), (), _mistakes(data, predicted, why)
-        )
+        mistakes = _mistakes(data, predicted, dict.fromkeys(np.flatnonzero(data.labels == 1).tolist(), (why, why)))
+        return Explanation(None, "", predicted, Confusion.of(data.labels, predicted), (), mistakes)
     parts = parts_of(formula)
     verdicts = [[_verdicts(part, data) for part in conjunction] for conjunction in parts]
     # Kleene's connectives are min and max on the verdicts' numbers
@@ -198,11 +199,12 @@ def explain(formula: Formula | None, data: LabelledTrajectories) -> Explanation:
         for number, (conjunction, row) in enumerate(zip(parts, verdicts, strict=True), 1)
         for separation in _separations(number, conjunction, row, data.labels)
     )
-    mistakes = tuple(
-        Mistake(row, data.ids[row], int(data.labels[row]), int(predicted[row]), _why(row, parts, verdicts, data))
+    reasons = {
+        row: tuple(_why(row, parts, verdicts, data, write) for write in (to_text, to_unicode))
         for row in np.flatnonzero(predicted != data.labels).tolist()
-    )
+    }
     confusion = Confusion.of(data.labels, predicted)
+    mistakes = _mistakes(data, predicted, reasons)
     return Explanation(formula, to_english(formula), predicted, confusion, separations, mistakes)
 
 
@@ -210,9 +212,12 @@ def _verdicts(formula: Formula, data: LabelledTrajectories) -> NDArray[np.int8]:
     return np.atleast_1d(formula.verdict(data.values, variables=data.variables, lengths=data.lengths))
 
 
-def _mistakes(data: LabelledTrajectories, predicted: NDArray[np.int8], why: str) -> tuple[Mistake, ...]:
-    rows = np.flatnonzero(predicted != data.labels).tolist()
-    return tuple(Mistake(row, data.ids[row], int(data.labels[row]), int(predicted[row]), why) for row in rows)
+def _mistakes(
+    data: LabelledTrajectories, predicted: NDArray[np.int8], reasons: Mapping[int, tuple[str, ...]]
+) -> tuple[Mistake, ...]:
+    return tuple(
+        Mistake(row, data.ids[row], int(data.labels[row]), int(predicted[row]), *why) for row, why in reasons.items()
+    )
 
 
 def _separations(
@@ -236,6 +241,7 @@ def _why(
     parts: tuple[tuple[Formula, ...], ...],
     verdicts: list[list[NDArray[np.int8]]],
     data: LabelledTrajectories,
+    write: Callable[[Formula], str],
 ) -> str:
     """Which part fails first in each disjunct or, where the formula is not violated, which disjunct admits the row."""
     reasons = []
@@ -244,15 +250,15 @@ def _why(
             part for part, verdict in zip(conjunction, row_verdicts, strict=True) if verdict[row] == Verdict.FALSE
         ]
         if failing:
-            reasons.append((False, f"violates {to_text(failing[0])}{_margin(failing[0], row, data)}"))
+            reasons.append((False, f"violates {write(failing[0])}{_margin(failing[0], row, data)}"))
             continue
         open_parts = [part for part, verdict in zip(conjunction, row_verdicts, strict=True) if not verdict[row]]
         if open_parts:
             last = int(data.lengths[row]) - 1
-            reasons.append((True, f"ends at tick {last}, before {to_text(open_parts[0])} is decided"))
+            reasons.append((True, f"ends at tick {last}, before {write(open_parts[0])} is decided"))
             continue
         tightest = min(conjunction, key=lambda part: abs(_robustness(part, row, data)))
-        reasons.append((True, f"satisfies {' and '.join(map(to_text, conjunction))}{_margin(tightest, row, data)}"))
+        reasons.append((True, f"satisfies {' and '.join(map(write, conjunction))}{_margin(tightest, row, data)}"))
     admitted = [text for holds, text in reasons if holds]
     return admitted[0] if admitted else "; ".join(dict.fromkeys(text for _, text in reasons))
 

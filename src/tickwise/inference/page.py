@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
-from tickwise.inference import drawing
+from tickwise.inference import drawing, plane
 from tickwise.inference.explanation import Explanation, Mistake
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.inference.tree import DecisionTree
@@ -37,12 +37,14 @@ class Branch:
         text: What it is, as a formula or in words.
         note: What is to be known of it.
         link: How it hangs on the node above it.
+        label: What it predicts, if it is a leaf.
         children: The nodes below it.
     """
 
     text: str
     note: str = ""
     link: str = ""
+    label: int | None = None
     children: tuple[Branch, ...] = ()
 
 
@@ -76,6 +78,7 @@ def render_page(
     panels = drawing.draw(found, data, rows, variables)
     mistakes = _all_mistakes(found, judged)
     wrong = np.array([data.ids.index(mistake.id) for mistake in mistakes[:_MISTAKES_DRAWN]], dtype=np.int64)
+    wrong_panels = drawing.draw(found, data, wrong, variables, named=True) if len(wrong) else ()
     loader = PackageLoader("tickwise.inference", "templates")
     environment = Environment(
         loader=loader, undefined=StrictUndefined, autoescape=select_autoescape(default=True), trim_blocks=True,
@@ -91,8 +94,10 @@ def render_page(
         formula_tree=None if found.formula is None else _formula_branch(found.formula),
         decision_tree=None if tree is None else _node_branch(tree),
         panels=panels,
-        wrong_panels=drawing.draw(found, data, wrong, variables) if len(wrong) else (),
-        drawn=len(rows), wrong_drawn=len(wrong), frame=drawing, listed=_MISTAKES_LISTED,
+        planes=plane.planes(found, data, rows)[:_MOST_PANELS],
+        wrong_panels=wrong_panels,
+        broken=any(line.breaks for panel in wrong_panels for line in panel.lines),
+        drawn=len(rows), wrong_drawn=len(wrong), frame=drawing, square=plane, listed=_MISTAKES_LISTED,
         undrawn=[name for name in data.variables if name not in variables],
         several=len({separation.disjunct for separation in found.separations}) > 1,
         nested=any(mark.rest is not None for panel in panels for mark in panel.marks),
@@ -137,7 +142,7 @@ def _formula_branch(formula: Formula, link: str = "") -> Branch:
     if isinstance(formula, Or | And):
         children = tuple(_formula_branch(child) for child in formula.children)
         note = "at least one of these" if isinstance(formula, Or) else "all of these"
-        return Branch("∨" if isinstance(formula, Or) else "∧", note, link, children)
+        return Branch("∨" if isinstance(formula, Or) else "∧", note, link, children=children)
     return Branch(to_unicode(formula), to_english(formula), link)
 
 
@@ -145,7 +150,7 @@ def _node_branch(node: DecisionTree, link: str = "") -> Branch:
     counts = f"{node.positives} with label 1, {node.negatives} with label -1"
     if node.primitive is None or node.left is None or node.right is None:
         why = f"; {_STOPS[node.stop]}" if node.stop else ""
-        return Branch(f"label {node.label}", f"{counts}{why}", link)
+        return Branch(f"label {node.label}", f"{counts}{why}", link, node.label)
     children = (_node_branch(node.left, "satisfied"), _node_branch(node.right, "violated"))
     note = f"{counts}; J = {node.objective:.4f}, I = {node.gain:.4f}"
-    return Branch(to_unicode(node.primitive), note, link, children)
+    return Branch(to_unicode(node.primitive), note, link, children=children)
