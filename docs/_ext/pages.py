@@ -1,21 +1,28 @@
 """Run the blocks of pages: what they print has to be what the pages show.
 
-``python docs/_ext/pages.py`` writes the outputs into the pages, and the tutorial's figure into ``docs/images``.
+``python docs/_ext/pages.py [PAGE ...]`` writes the outputs into the pages, and the tutorial's figure into
+``docs/images``.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import os
 import re
 import shlex
 import shutil
+import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
+
+os.environ["NO_COLOR"] = "1"  # is looked at when the command line is imported
 
 from tickwise.cli import main
+from tickwise.cli.app import output
 
 DOCS = Path(__file__).parents[1]
 PAGES = ("tutorial", "concepts", "how-to/add-a-case-study", "how-to/many-seeds")
@@ -25,6 +32,17 @@ FIGURES = {"curves.svg": "tutorial-curves.svg"}
 """What blocks write that pages show, and its name in ``docs/images``."""
 
 _FENCE = re.compile(r"^```(?P<kind>python|console|text)\n(?P<body>.*?)^```$", flags=re.MULTILINE | re.DOTALL)
+
+
+WIDTH = 92
+"""Columns of the terminal in which commands are run: as wide as a page's column."""
+
+
+class _Terminal(io.StringIO):
+    """Keeps what is printed, and is a terminal, so that tables are drawn as a reader will see them."""
+
+    def isatty(self) -> bool:
+        return True
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,20 +100,25 @@ def run(step: Step, names: dict[str, object]) -> str:
         names: The names that Python blocks share; new ones are added.
 
     Returns:
-        The output, without spaces at the ends of lines; tabs are one space.
+        The output, without spaces at the ends of lines; that of a command is what a terminal without colours shows.
 
     Raises:
         ValueError: If the command is not ``tickwise`` or fails.
     """
-    printed = io.StringIO()
+    printed = io.StringIO() if step.kind == "python" else _Terminal()
     with contextlib.redirect_stdout(printed):
         if step.kind == "python":
             exec(compile("\n" * (step.line - 1) + step.source, "<page>", "exec"), names)
         else:
-            program, *arguments = shlex.split(step.source)
-            if program != "tickwise" or main(arguments) != 0:
-                raise ValueError(f"line {step.line}: {step.source} is no command that succeeds")
-    return "".join(f"{line.rstrip()}\n" for line in printed.getvalue().replace("\t", " ").splitlines())
+            _command(step)
+    return "".join(f"{line.rstrip()}\n" for line in printed.getvalue().splitlines())
+
+
+def _command(step: Step) -> None:
+    program, *arguments = shlex.split(step.source)
+    with patch.dict(os.environ, TERM="xterm"), patch.object(output, "_width", WIDTH):
+        if program != "tickwise" or main(arguments) != 0:
+            raise ValueError(f"line {step.line}: {step.source} is no command that succeeds")
 
 
 def same(printed: str, shown: str) -> bool:
@@ -122,15 +145,15 @@ def rewrite(path: Path) -> None:
         for name, kept in FIGURES.items():
             if Path(name).exists():
                 shutil.copy(name, DOCS / "images" / kept)
-    for step, output in reversed(list(zip(found, outputs, strict=True))):
-        if same(output, step.shown):
+    for step, printed in reversed(list(zip(found, outputs, strict=True))):
+        if same(printed, step.shown):
             continue
         if step.span is None:
             raise ValueError(f"{path.name}, line {step.line}: this block prints something; put a text block after it")
-        page = page[: step.span[0]] + output + page[step.span[1] :]
+        page = page[: step.span[0]] + printed + page[step.span[1] :]
     path.write_text(page, encoding="utf-8")
 
 
 if __name__ == "__main__":
-    for each in PAGES:
+    for each in sys.argv[1:] or PAGES:
         rewrite(DOCS / f"{each}.md")
