@@ -25,6 +25,9 @@ ITEMS = (
 )
 """What the paper numbers."""
 
+LINES = {"Algorithm 1": 16, "Algorithm 2": 14}
+"""How many lines its algorithms have."""
+
 _ROW = re.compile(r"^\| (.+?) \| `([\w/]+)\.py` \| (.+?) \|$", flags=re.MULTILINE)
 
 
@@ -78,6 +81,12 @@ def mapped(item: str) -> list[Place]:
     ]
 
 
+def numbers(text: str) -> set[int]:
+    """The lines that ``8-9, 11`` names; none for ``all``."""
+    parts = (part.partition("-") for part in text.split(", ") if part != "all")
+    return {line for first, _, last in parts for line in range(int(first), int(last or first) + 1)}
+
+
 class _Linked(SphinxDirective):
     """What the directives share: links to lines of the source pages."""
 
@@ -109,7 +118,7 @@ class PaperMap(_Linked):
     """The table of CONTRIBUTING.md with links, in the order of the paper."""
 
     def run(self) -> list[nodes.Node]:
-        """A table for each section of the paper."""
+        """The table."""
         self.note_sources()
         try:
             found = rows()
@@ -139,7 +148,8 @@ class PaperNumbers(_Linked):
 class PaperLines(_Linked):
     """The lines of an algorithm: its number is the argument, and a line of content is ``lines | what they do``.
 
-    A row whose lines no comment cites alone stands for the whole, and shows what the map names for the algorithm.
+    The row ``all`` shows what the map names for the algorithm as a whole. A row without code, and a line of the
+    algorithm without a row, is a warning.
     """
 
     required_arguments = 1
@@ -149,21 +159,20 @@ class PaperLines(_Linked):
         """The table."""
         self.note_sources()
         item = f"Algorithm {self.arguments[0]}"
-        found = []
+        found, told = [], set[int]()
         for row in self.content:
             lines, what = row.split(" | ")
+            told |= numbers(lines)
             places_of = self._places(item, lines)
             if not places_of:
                 LOGGER.warning("no code cites line %s of %s", lines, item, location=self.get_location())
             found.append((nodes.Text(lines.replace("-", "–")), nodes.Text(what), self.links(places_of)))
+        if missing := set(range(1, LINES[item] + 1)) - told:
+            LOGGER.warning("no row for lines %s of %s", sorted(missing), item, location=self.get_location())
         return [table(("Line", "What it does", "Code"), found, (10, 42, 48))]
 
     @staticmethod
     def _places(item: str, text: str) -> list[Place]:
-        if text.startswith("all"):
-            return mapped(item)
-        wanted: set[int] = set()
-        for part in text.split(", "):
-            first, _, last = part.partition("-")
-            wanted |= set(range(int(first), int(last or first) + 1))
-        return [citation.place for citation in cited(item) if citation.lines & wanted]
+        if text == "all":
+            return [place for paper, where in rows() if paper.endswith(item) for place in where]
+        return [citation.place for citation in cited(item) if citation.lines & numbers(text)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,19 @@ def test_every_row_of_the_map_is_found():
 def test_every_number_of_the_paper_is_somewhere():
     for item in papermap.ITEMS:
         assert papermap.mapped(item), item
+
+
+def test_rows_name_lines():
+    assert papermap.numbers("8-9, 11") == {8, 9, 11}
+    assert papermap.numbers("all") == set()
+
+
+def test_every_line_of_an_algorithm_has_a_row():
+    page = (papermap.ROOT / "docs" / "reference" / "paper.md").read_text(encoding="utf-8")
+    for item, last in papermap.LINES.items():
+        (block,) = re.findall(rf"```{{paper-lines}} {item[-1]}\n(.*?)```", page, flags=re.DOTALL)
+        told = [line for row in block.splitlines() for line in papermap.numbers(row.split(" | ")[0])]
+        assert sorted(told) == list(range(1, last + 1))
 
 
 @pytest.mark.parametrize(

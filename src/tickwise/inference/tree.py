@@ -240,7 +240,7 @@ class _Grower:
         gaps = self.space.gaps([(primitive.start, primitive.end) for primitive in path])
         stop = self._stop(share, depth, gaps) or ("interrupted" if interrupted else None)
         if data is None or stop is not None:  # line 2
-            # lines 3 to 7: a leaf, with label 1 if more than half of its trajectories have it
+            # lines 3 to 8: a leaf, with label 1 if more than half of its trajectories have it
             label = 1 if share > 0.5 else -1
             return DecisionTree(path, depth, positives, negatives, stop, label, interrupted=interrupted)
         # lines 9 to 11: a non-leaf node with the best primitive over Υ_z, which the gaps are
@@ -253,7 +253,7 @@ class _Grower:
             subset, below = data.select(mask) if mask.any() else None, (*path, step)
             children.append(self.grow(subset, weights[mask], below, depth + 1, rng.spawn(1)[0], interrupted))
             interrupted = interrupted or children[-1].interrupted
-        return DecisionTree(
+        return DecisionTree(  # line 15
             path, depth, positives, negatives, None, None, primitive, best.objective, best.rate, best.gain,
             left=children[0], right=children[1], gap=best.gap, interrupted=interrupted,
         )  # fmt: skip

@@ -46,7 +46,7 @@ def transfer_q(
             extended states.
         AutomatonError: If φ^T is not structurally transferable from φ^S.
     """
-    _check(source_mdp, source_memory, source_q, target_mdp, target_memory)
+    _check(source_mdp, source_memory, source_q, target_mdp, target_memory)  # line 1
     shape = (target_memory.n_states, target_mdp.n_states, target_mdp.n_actions)
     target_q = np.full(shape, initial, dtype=np.float32)
     for i, target in enumerate(target_memory.tables):  # line 2
@@ -61,11 +61,11 @@ def transfer_q(
             for j, (rho_source, rho_target) in enumerate(pairs)
         ]
         similar_u = similar_valuations(source, target, xi)
-        for u in range(1, len(target)):  # lines 2 and 8: every location and valuation
+        for u in range(1, len(target)):  # line 2: every location and valuation
             j = target.stage[u]  # line 3: the primitive that is still to be satisfied; ξ_Σ is by position (line 5)
             learned = source_q[source_memory.offsets[i_hat] + similar_u[u]]
             target_q[target_memory.offsets[i] + u] = learned[states[j]]  # line 12
-    return target_q
+    return target_q  # line 14
 
 
 def _centroids(table: TickTable, mdp: TabularMDP) -> NDArray[np.float64]:
@@ -144,7 +144,7 @@ def similar_valuations(source: TickTable, target: TickTable, xi: Bijections) -> 
         Source table states, shape ``(target table states,)``; 0 for the start.
     """
     similar = np.zeros(len(target), dtype=np.int64)
-    for u in range(1, len(target)):
+    for u in range(1, len(target)):  # line 8
         there = np.flatnonzero(source.location == xi.locations[target.location[u]])  # line 7
         there = there[there > 0] if there[-1] > 0 else there
         values = source.clocks[there][:, xi.clocks].astype(np.int64)  # line 9
