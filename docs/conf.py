@@ -27,6 +27,7 @@ extensions = [
     "markdown",
     "modules",
     "papermap",
+    "session",
     "sourcelines",
 ]
 exclude_patterns = ["_ext", "_static", "images"]

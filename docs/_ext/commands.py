@@ -36,17 +36,19 @@ class CommandLine(SphinxDirective):
         section = nodes.section(ids=[nodes.make_id(title)], names=[nodes.fully_normalize_name(title)])
         self.state.document.note_explicit_target(section)
         section += nodes.title("", "", nodes.literal(title, title))
-        what, *examples = re.split(r"\bFor example: ", re.sub(r"\s+", " ", command.help or ""))
-        section += nodes.paragraph("", what.strip())
+        section += nodes.paragraph("", "", *_text(" ".join((command.help or "").split())))
         context = command.make_context(command.name, [], resilient_parsing=True)
         usage = " ".join((title, *command.collect_usage_pieces(context)))
-        lines = [usage, *(f"\n# for example\n{example}" for example in examples)]
-        section += nodes.literal_block("", "\n".join(lines), language="sh")
+        section += nodes.literal_block(usage, usage, language="text")
         for kind, heading in (("argument", "Argument"), ("option", "Option")):
             records = [each.get_help_record(context) for each in command.params if each.param_type_name == kind]
             rows = [self._row(*record) for record in records if record is not None]
             if rows:
-                section += table((heading, "What it says", "Otherwise"), rows, (26, 54, 20))
+                section += table((heading, "Meaning", "Default and limits"), rows, (26, 54, 20))
+        # the help ends with a mark, a heading and an example a line
+        if examples := [line.strip() for line in (command.epilog or "").splitlines()[2:]]:
+            text = "\n".join(examples)
+            section += [nodes.paragraph("", "For example:"), nodes.literal_block(text, text, language="sh")]
         return section
 
     @staticmethod
@@ -55,4 +57,12 @@ class CommandLine(SphinxDirective):
         found = re.fullmatch(r"(.*?)(?:  \[(.*)\])?", text, flags=re.DOTALL)
         assert found is not None
         otherwise = (found.group(2) or "").replace("default: ", "").replace("; ", ", ").replace("x>=", "at least ")
-        return nodes.literal(form, form), nodes.Text(found.group(1)), nodes.Text(otherwise)
+        return nodes.literal(form, form), nodes.paragraph("", "", *_text(found.group(1))), nodes.Text(otherwise)
+
+
+def _text(text: str) -> list[nodes.Node]:
+    """Text whose options and quotations stay as one has to type them."""
+    parts = re.split(r"(--[\w-]+|'[^']+'(?!\w))", text)
+    return [
+        nodes.literal(part, part.strip("'")) if number % 2 else nodes.Text(part) for number, part in enumerate(parts)
+    ]

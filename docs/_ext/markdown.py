@@ -11,17 +11,25 @@ from sphinx.application import Sphinx
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
-    """Register the extension, ahead of napoleon."""
+    """Register what comes before napoleon, and what comes after it."""
     app.connect("autodoc-process-docstring", _process, priority=100)
+    app.connect("autodoc-process-docstring", _join, priority=900)
     return {"parallel_read_safe": True, "parallel_write_safe": True}
 
 
 def _process(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
-    del app, name, obj, options
-    if what in ("data", "attribute", "property") and lines:
-        lines.insert(0, "")  # a first line "what: which" is a sentence, and no type with a description
+    del app, what, name, obj, options
     if any(_kind(line) for line in lines):
         lines[:] = restructured(lines)
+
+
+def _join(app: Sphinx, what: str, name: str, obj: object, options: object, lines: list[str]) -> None:
+    """Put together what napoleon takes apart: "what: which" on a value is a sentence, not a type and a description."""
+    del app, name, obj, options
+    if what in ("data", "attribute", "property") and lines and lines[0]:
+        types = [line for line in lines if line.startswith(":type: ")]
+        lines[:] = [line for line in lines if line not in types]
+        lines[0] = ": ".join((*(line.removeprefix(":type: ") for line in types), lines[0]))
 
 
 def restructured(lines: list[str]) -> list[str]:

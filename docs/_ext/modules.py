@@ -1,4 +1,4 @@
-"""The directives ``package`` and ``facade``: the reference of all public modules, and of the names of ``tickwise``."""
+"""The directives ``package``, ``modules`` and ``facade``: the reference of all public modules, and what leads there."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ LEFT_OUT = ("tickwise.cli", "tickwise.__main__")
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives, and show types as the source has them."""
     app.add_directive("package", Package)
+    app.add_directive("modules", Modules)
     app.add_directive("facade", Facade)
     for field in PyObject.doc_field_types:
         if field.name == "variable":
@@ -47,11 +48,29 @@ class Package(SphinxDirective):
         documented = self.env.metadata[self.env.docname].setdefault("modules", "")
         self.env.metadata[self.env.docname]["modules"] = " ".join((documented, *modules)).strip()
         lines = []
-        for module in modules:
-            if set(places(module)) - {"__all__"}:  # a package's own file may have nothing but a description
-                title = module.removeprefix("tickwise.")
-                lines += [f"## `{title}`", "", "```{eval-rst}", f".. automodule:: {module}", "```", ""]
+        for module in _filled(modules):
+            title = module.removeprefix("tickwise.")
+            lines += [f"## `{title}`", "", "```{eval-rst}", f".. automodule:: {module}", "```", ""]
         return self.parse_text_to_nodes("\n".join(lines), allow_section_headings=True)
+
+
+class Modules(SphinxDirective):
+    """A table of the public modules of a package, with the first sentence on each."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """The table, whose names lead to the sections."""
+        lines = ["```{eval-rst}", ".. list-table::", "   :widths: 30 70", ""]
+        for module in _filled(public_modules(self.arguments[0])):
+            about = (import_module(module).__doc__ or "").split("\n\n")[0].replace("\n", " ")
+            lines += [f"   * - :py:mod:`{module.removeprefix('tickwise.')} <{module}>`", f"     - {about}"]
+        return self.parse_text_to_nodes("\n".join((*lines, "```")))
+
+
+def _filled(modules: tuple[str, ...]) -> list[str]:
+    """The modules that define something; a package's own file may have nothing but a description."""
+    return [module for module in modules if set(places(module)) - {"__all__"}]
 
 
 class Facade(SphinxDirective):
@@ -68,7 +87,7 @@ class Facade(SphinxDirective):
         lines = []
         for package in sorted(homes, key=_PACKAGES.index):
             about = (import_module(f"tickwise.{package}").__doc__ or "").split("\n")[0]
-            lines += [f"**{package}** – {about[:1].lower()}{about[1:]}" if package != "errors" else "**errors**", ""]
+            lines += [f"**{package}**" if package == "errors" else f"**{package}**: {about}", ""]
             lines += [".. list-table::", "   :widths: 34 66", ""]
             for value in homes[package]:
                 first = (inspect.getdoc(value) or "").split("\n\n")[0].replace("\n", " ")

@@ -34,7 +34,7 @@ FIGURES = {"curves.svg": "tutorial-curves.svg"}
 _FENCE = re.compile(r"^```(?P<kind>python|console|text)\n(?P<body>.*?)^```$", flags=re.MULTILINE | re.DOTALL)
 
 
-WIDTH = 92
+WIDTH = 96
 """Columns of the terminal in which commands are run: as wide as a page's column."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pages
@@ -25,6 +26,12 @@ def test_every_output_is_as_shown(name: str, tmp_path: Path, monkeypatch: pytest
         assert pages.same(printed, step.shown), f"line {step.line} prints\n{printed}\nand not\n{step.shown}"
     if name == "tutorial":
         assert all((tmp_path / figure).stat().st_size for figure in pages.FIGURES)
+
+
+def test_code_fits_into_the_column():
+    for path in pages.DOCS.rglob("*.md"):
+        for block in re.findall(r"^```(?:python|sh)\n(.*?)^```$", path.read_text(encoding="utf-8"), re.M | re.S):
+            assert max(map(len, block.splitlines())) <= 100, f"{path.name}: {block}"
 
 
 def test_the_tutorial_has_commands_and_code():
