@@ -64,7 +64,7 @@ class Modules(SphinxDirective):
         lines = ["```{eval-rst}", ".. list-table::", "   :widths: 30 70", ""]
         for module in _filled(public_modules(self.arguments[0])):
             about = (import_module(module).__doc__ or "").split("\n\n")[0].replace("\n", " ")
-            lines += [f"   * - :py:mod:`{module.removeprefix('tickwise.')} <{module}>`", f"     - {about}"]
+            lines += [f"   * - :py:mod:`{module.removeprefix(f'{self.arguments[0]}.')} <{module}>`", f"     - {about}"]
         return self.parse_text_to_nodes("\n".join((*lines, "```")))
 
 
