@@ -294,7 +294,8 @@ def draw(
         for name in filter(runs[0].__contains__, METHODS):
             colour, line = METHODS[name]
             shares = np.array([run[name] for run in runs])
-            mean, error = shares.mean(axis=0), 1.96 * shares.std(axis=0, ddof=1) / np.sqrt(len(shares))
+            mean = shares.mean(axis=0)
+            error = 1.96 * shares.std(axis=0, ddof=1) / np.sqrt(len(shares)) if len(shares) > 1 else 0 * mean
             axes.plot(times, 100 * mean, color=colour, linestyle=line, linewidth=2, label=name)
             axes.fill_between(times, 100 * (mean - error), 100 * (mean + error), color=colour, alpha=0.15, linewidth=0)
         axes.set(xlabel=f"{unit} of learning in the target", ylabel="success of the greedy policy, % of the best")

@@ -1,4 +1,4 @@
-"""From data of one's own to a formula, as someone new would do it: one command, and nothing else."""
+"""What someone new does from the README alone: from data of their own to a formula, from an environment to an agent."""
 
 from __future__ import annotations
 
@@ -6,11 +6,14 @@ import csv
 import json
 import random
 import re
+import shutil
 from pathlib import Path
 
+import pages
 import pytest
 
 from tests.test_cli import answer_of
+from tests.test_readme import BLOCKS, README
 
 
 @pytest.fixture
@@ -66,3 +69,25 @@ def test_the_formula_carries_over_to_new_data(kettles: Path, tmp_path: Path):
         ["hot too late", "false"],
         ["never hot", "false"],
     ]
+
+
+def test_the_readmes_command_prints_what_it_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(README.parent / "examples", "examples", ignore=shutil.ignore_patterns("__pycache__"))
+    (step,) = pages.steps("\n".join(re.findall(r"^```console\n.*?^```$", README.read_text("utf-8"), re.M | re.S)))
+    printed = re.sub(r"\d+\.\d s\b", "… s", pages.run(step, {}))
+    parts = re.sub(r"\d+\.\d s\b", "… s", step.shown).split("[…]\n")
+    assert len(parts) == 3  # what is left out
+    assert re.fullmatch(".*".join(map(re.escape, parts)), printed, re.S), printed
+    assert Path("kiln.html").stat().st_size > 10_000
+
+
+def test_from_gymnasium_make_to_a_trained_agent_in_under_25_lines(capsys: pytest.CaptureFixture[str]):
+    pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed; run make sb3")
+    torch = pytest.importorskip("torch")
+    block = BLOCKS[0]
+    assert "gymnasium.make(" in block
+    assert len(block.splitlines()) < 25
+    torch.set_num_threads(1)  # tests run side by side
+    exec(block, {})
+    assert capsys.readouterr().out == "True\n"
