@@ -26,13 +26,14 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.callbacks import BaseCallback
 
 from comparison import draw, table
-from tickwise.envs.wrappers import ExtendedState, Labelled, TimedTask
+from tickwise.envs.wrappers import ExtendedState, Labelled, PotentialShaping, TimedTask
 from tickwise.transfer.deep import transfer_values
 from tickwise.transfer.observations import ObservationMap
 
 SIZES = (4, 7)
-SOURCE_STEPS = {"dqn": 10_000, "ppo": 40_000}
-STEPS = {"dqn": 16_000, "ppo": 60_000}
+GAMMA = 0.98
+SOURCE_STEPS = {"dqn": 10_000, "ppo": 25_000}
+STEPS = {"dqn": 16_000, "ppo": 40_000}
 EVALUATIONS = 40
 """Evaluations of an agent while it learns, beside the one before."""
 
@@ -58,10 +59,15 @@ def extended(size: int) -> ExtendedState:
 
 
 def agent(algorithm: str, env: Any, seed: int, *, taught: bool = False) -> BaseAlgorithm:
-    """A new agent; one that is taught explores little."""
-    common = {"learning_rate": 1e-3, "gamma": 0.98, "seed": seed, "device": "cpu"}
+    """A new agent; one that is taught explores little.
+
+    PPO, which remembers no success, does not learn from a reward at the end alone: where there is an extended state, it
+    is rewarded for progress.
+    """
+    common = {"learning_rate": 1e-3, "gamma": GAMMA, "seed": seed, "device": "cpu"}
     if algorithm == "ppo":
-        return PPO("MlpPolicy", env, n_steps=512, batch_size=128, ent_coef=0.0 if taught else 0.02, **common)
+        felt = PotentialShaping(env, GAMMA) if isinstance(env, ExtendedState) else env
+        return PPO("MlpPolicy", felt, n_steps=512, batch_size=128, ent_coef=0.0 if taught else 0.02, **common)
     return DQN(
         "MlpPolicy", env, buffer_size=20_000, learning_starts=500, target_update_interval=250,
         exploration_fraction=0.5, exploration_initial_eps=0.1 if taught else 1.0, **common

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 
@@ -151,3 +152,28 @@ def test_times_of_key_and_door_are_inferred_and_transferred(example: Example):
     alone, helped = (comparison.episodes_to(run[name], learning.step) for name in list(comparison.METHODS)[2:])
     assert helped < alone
     assert run["state and tick"][-20:].mean() < 0.5
+
+
+@pytest.mark.parametrize("algorithm", ["dqn", "ppo"])
+def test_deep_agents_are_compared(
+    algorithm: str,
+    example: Example,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    """A moment of what the example does; test_deep.py has agents that learn."""
+    pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed; run make sb3")
+    deep = example("deep")
+    monkeypatch.setattr(deep, "SOURCE_STEPS", {algorithm: 600})
+    monkeypatch.setattr(deep, "STEPS", {algorithm: 1_200})
+    monkeypatch.setattr(deep, "EVALUATIONS", 12)
+    monkeypatch.setattr(deep, "transfer_values", partial(deep.transfer_values, steps=300, updates=50))
+    monkeypatch.setattr(sys, "argv", ["deep", "--algorithm", algorithm, "--out", str(tmp_path), "--seeds", "1"])
+    deep.main()
+    shown = capsys.readouterr()
+    assert "seed 0: source " in shown.err
+    assert [line[:36].strip() for line in shown.out.splitlines() if line.endswith("of 1")] == [
+        "state", "extended state", "extended state, transferred values",
+    ]  # fmt: skip
+    assert (tmp_path / f"{algorithm}.png").stat().st_size > 10_000
