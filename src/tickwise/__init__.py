@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from tickwise.logic.sdnf import SDNF, Primitive, to_sdnf
     from tickwise.logic.structure import structurally_equivalent, structurally_transferable
     from tickwise.logic.syntax import Box, Formula, Verdict
+    from tickwise.transfer.observations import ObservationMap
     from tickwise.transfer.qtransfer import transfer_q
 
     __version__: str
@@ -51,6 +52,7 @@ __all__ = [
     "LabelledTrajectories",
     "MITLClassifier",
     "MarkovPrior",
+    "ObservationMap",
     "PathPrior",
     "PotentialShaping",
     "Primitive",
@@ -98,6 +100,7 @@ _HOMES = {
     "logic.sdnf": ("SDNF", "Primitive", "to_sdnf"),
     "logic.structure": ("structurally_equivalent", "structurally_transferable"),
     "logic.syntax": ("Box", "Formula", "Verdict"),
+    "transfer.observations": ("ObservationMap",),
     "transfer.qtransfer": ("transfer_q",),
 }
 """The public names, by the module they live in."""
