@@ -6,12 +6,16 @@ import os
 import sys
 from pathlib import Path
 
+from sphinx.ext.autodoc.mock import mock
+
 DOCS = Path(__file__).parent
 
 # the tree beside this file is documented, whatever is installed
 sys.path[:0] = [str(DOCS / "_ext"), str(DOCS.parent / "src")]
 # compiled functions hide their signatures; nothing is computed here but the figures
 os.environ["NUMBA_DISABLE_JIT"] = "1"
+# what these are is not documented here, and they are larger than all else together
+mock(["stable_baselines3", "torch"]).__enter__()
 
 project = "Tickwise"
 author = "The Tickwise developers"

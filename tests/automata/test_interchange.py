@@ -153,6 +153,7 @@ def changed(*path_and_value: object) -> str:
         (changed("edges", 0, "source", "nowhere"), "the location 'nowhere'"),
         (changed("edges", 0, "guard", [["c1", "<"]]), "a clock constraint in the JSON has 2 entries"),
         (changed("edges", 0, "guard", [["c1", "=", 2]]), "comparison '='"),
+        (changed("edges", 0, "guard", [["c1", "long" * 999, 2]]), "comparison 'longlong.{1,60}…"),
         (changed("edges", 0, "guard", [["c1", "<", 2.0]]), "a clock constraint in the JSON is 2.0"),
         (changed("edges", 0, "literals", [[0, 1]]), "a literal in the JSON is 1"),
         (changed("edges", 0, "literals", [[3, True]]), "predicate of edge 0 3"),

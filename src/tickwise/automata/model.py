@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._wording import brief
 from tickwise.errors import AutomatonError
 from tickwise.logic.sdnf import SequentialConjunction
 from tickwise.logic.syntax import Predicate, Verdict
@@ -47,7 +48,7 @@ class ClockConstraint:
 
     def __post_init__(self) -> None:
         if self.comparison not in COMPARISONS:
-            raise AutomatonError(f"comparison {self.comparison!r} is unknown; use one of {', '.join(COMPARISONS)}")
+            raise AutomatonError(f"comparison {brief(self.comparison)} is unknown; use one of {', '.join(COMPARISONS)}")
         _check_index("clock", self.clock, UNBOUNDED)
         _check_index("constant of a clock constraint", self.value, UNBOUNDED)
 
@@ -274,15 +275,15 @@ def live_clocks(edges: Iterable[Edge], locations: int) -> tuple[frozenset[int], 
 
 def _check_index(what: str, index: object, limit: int) -> None:
     if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < limit:
-        raise AutomatonError(f"{what} {index!r} is out of range; use a whole number from 0 to {limit - 1}")
+        raise AutomatonError(f"{what} {brief(index)} is out of range; use a whole number from 0 to {limit - 1}")
 
 
 def _check_names(what: str, names: tuple[str, ...]) -> None:
     for name in names:
         if not isinstance(name, str) or not name:
-            raise AutomatonError(f"the {what} name {name!r} is not a name; use text of one character or more")
+            raise AutomatonError(f"the {what} name {brief(name)} is not a name; use text of one character or more")
         if names.count(name) > 1:
-            raise AutomatonError(f"two {what}s are called {name!r}; use different names")
+            raise AutomatonError(f"two {what}s are called {brief(name)}; use different names")
 
 
 def _check_parts(automaton: TimedAutomaton) -> None:
@@ -295,7 +296,9 @@ def _check_parts(automaton: TimedAutomaton) -> None:
     for location in automaton.accepting | automaton.rejecting:
         _check_index("accepting or rejecting location", location, count)
     for location in automaton.accepting & automaton.rejecting:
-        raise AutomatonError(f"location {automaton.locations[location]!r} is both accepting and rejecting; choose one")
+        raise AutomatonError(
+            f"location {brief(automaton.locations[location])} is both accepting and rejecting; choose one"
+        )
     if len(automaton.stages) != count or len(automaton.active) != count:
         raise AutomatonError(
             f"there are {count} locations, but {len(automaton.stages)} stages and {len(automaton.active)} "
@@ -317,7 +320,7 @@ def _check_edge(automaton: TimedAutomaton, number: int, edge: Edge) -> None:
         _check_index(f"clock of edge {number}", clock, len(automaton.clocks))
     if edge.source in automaton.accepting | automaton.rejecting and edge.target != edge.source:
         raise AutomatonError(
-            f"edge {number} leaves {automaton.locations[edge.source]!r}; accepting and rejecting locations absorb"
+            f"edge {number} leaves {brief(automaton.locations[edge.source])}; accepting and rejecting locations absorb"
         )
 
 
@@ -334,7 +337,7 @@ def _check_deterministic(automaton: TimedAutomaton) -> None:
     for first, second in combinations(automaton.edges, 2):
         if first.source == second.source and _clash(first, second, len(automaton.clocks)):
             raise AutomatonError(
-                f"not deterministic: two edges of {automaton.locations[first.source]!r} can be enabled at "
+                f"not deterministic: two edges of {brief(automaton.locations[first.source])} can be enabled at "
                 f"once, {describe(automaton, first)} and {describe(automaton, second)}; make their letters "
                 "or guards disjoint"
             )
@@ -345,5 +348,5 @@ def _check_activity(automaton: TimedAutomaton) -> None:
     for name, needed, active in zip(automaton.locations, live, automaton.active, strict=True):
         for clock in sorted(needed - active):
             raise AutomatonError(
-                f"clock {automaton.clocks[clock]!r} matters in {name!r} but is not active there; add it"
+                f"clock {brief(automaton.clocks[clock])} matters in {brief(name)} but is not active there; add it"
             )

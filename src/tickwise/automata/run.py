@@ -16,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._wording import brief
 from tickwise.automata.model import TimedAutomaton, letter_text
 from tickwise.errors import AutomatonError, DataError
 from tickwise.logic.semantics import Batch, Trajectories, as_batch, holds
@@ -227,7 +228,7 @@ def run_on(automaton: TimedAutomaton, letters: Sequence[int]) -> Run:
         )
         if edge is None:
             raise AutomatonError(
-                f"not complete: no edge of {automaton.locations[location]!r} can be taken at tick {tick} on "
+                f"not complete: no edge of {brief(automaton.locations[location])} can be taken at tick {tick} on "
                 f"{letter_text(letter, len(automaton.predicates))}; add one"
             )
         after = tuple(0 if clock in edge.resets else value for clock, value in enumerate(valuation))

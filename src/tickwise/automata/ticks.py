@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise._jit import njit
+from tickwise._wording import brief
 from tickwise.automata.model import TimedAutomaton, letter_text
 from tickwise.errors import AutomatonError, ConfigurationError, DataError
 
@@ -155,7 +156,7 @@ def _constants(automaton: TimedAutomaton) -> list[int]:
 def _missing(automaton: TimedAutomaton, location: int, clocks: NDArray[np.int64], letter: int) -> str:
     values = ", ".join(f"{name}={value}" for name, value in zip(automaton.clocks, clocks, strict=True))
     return (
-        f"not complete: after {automaton.locations[location]!r} with {values or 'no clocks'} no edge "
+        f"not complete: after {brief(automaton.locations[location])} with {values or 'no clocks'} no edge "
         f"can be taken on {letter_text(letter, len(automaton.predicates))}; add one"
     )
 
