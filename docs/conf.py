@@ -6,7 +6,7 @@ import os
 import sys
 from pathlib import Path
 
-from sphinx.ext.autodoc.mock import mock
+from sphinx.ext.autodoc.mock import MockFinder
 
 DOCS = Path(__file__).parent
 
@@ -15,7 +15,7 @@ sys.path[:0] = [str(DOCS / "_ext"), str(DOCS.parent / "src")]
 # compiled functions hide their signatures; nothing is computed here but the figures
 os.environ["NUMBA_DISABLE_JIT"] = "1"
 # what these are is not documented here, and they are larger than all else together
-mock(["stable_baselines3", "torch"]).__enter__()
+sys.meta_path.insert(0, MockFinder(["stable_baselines3", "torch"]))
 
 project = "Tickwise"
 author = "The Tickwise developers"
