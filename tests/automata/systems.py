@@ -173,24 +173,30 @@ def uppaal_globals(text: str) -> tuple[dict[str, object], list[str]]:
 
 
 def uppaal_process(template: ElementTree.Element, values: dict[str, object]) -> Process:
+    """A template's clocks are its own, also where another template's have the same names."""
+    name = template.findtext("name")
+    clocks = re.fullmatch(r"clock ([\w, ]+);", template.findtext("declaration")).group(1).split(", ")
+
+    def own(text: str) -> str:
+        return re.sub(rf"\b({'|'.join(clocks)})\b", rf"{name}_\1", text)
+
     names = {place.get("id"): place.findtext("name") for place in template.iter("location")}
     steps = []
     for edge in template.iter("transition"):
         labels = {label.get("kind"): label.text for label in edge.findall("label")}
-        updates = list(filter(None, labels.get("assignment", "").split(", ")))
+        updates = list(filter(None, own(labels.get("assignment", "")).split(", ")))
         source, target = (names[edge.find(end).get("ref")] for end in ("source", "target"))
-        event, guard = labels.get("synchronisation", ""), python(labels.get("guard", ""))
+        event, guard = labels.get("synchronisation", ""), python(own(labels.get("guard", "")))
         choices = uppaal_choices(labels.get("select"), values)
         steps += [Step(source, target, event, guard, list(map(choice, updates))) for choice in choices]
-    declared = template.findtext("declaration")
     return Process(
-        template.findtext("name"),
+        name,
         names[template.find("init").get("ref")],
         steps,
-        re.fullmatch(r"clock ([\w, ]+);", declared).group(1).split(", "),
+        [own(clock) for clock in clocks],
         {names[place.get("id")] for place in template.iter("location") if place.find("committed") is not None},
         {
-            names[place.get("id")]: python(label.text)
+            names[place.get("id")]: python(own(label.text))
             for place in template.iter("location")
             for label in place.findall("label")
             if label.get("kind") == "invariant"

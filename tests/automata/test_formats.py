@@ -66,6 +66,19 @@ def test_a_system_gives_the_verdicts_of_its_automata(phi, seed, format):
         assert outcome(f"{name}.{simulation.places[name]}") == automaton.verdict(X, variables=VARIABLES)
 
 
+@pytest.mark.parametrize("format", sorted(TOGETHER))
+def test_automata_with_clocks_of_the_same_names_do_not_disturb_one_another(format):
+    """Both have a clock c2: the first one's is reset again and again while the second one's has to go on."""
+    phi = parse("G[0,9] F[0,1] (x >= 1) | F[0,4] G[0,3] (y >= 1)")
+    automata = timed_automata(phi)
+    X = np.array([[0, 1], [1, 1], [0, 1], [1, 1], [0, 1]], dtype=float)
+    text = export_all(automata, format)
+    system = read_uppaal(text) if format == "uppaal" else read_tchecker(text)
+    simulation = Simulation(system)
+    simulation.run(words(automata, X))
+    assert simulation.places["Automaton2"] == "acc"
+
+
 @settings(max_examples=100, deadline=None)
 @given(sdnfs(most=3, disjuncts=2))
 def test_the_letters_are_those_that_some_state_has(phi):
