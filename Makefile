@@ -24,7 +24,7 @@ test-slow: $(VENV)/.development ## run the longer studies too
 sb3: $(VENV)/.sb3 ## install Stable-Baselines3 and PyTorch too, so that `make test` has their tests
 
 docs: $(VENV)/.development ## build the documentation in build/docs; a warning is an error
-	NO_COLOR=1 $(BIN)/python -m sphinx -W --keep-going -q -b html docs build/docs
+	NO_COLOR=1 $(BIN)/python -m sphinx -E -W --keep-going -q -b html docs build/docs
 
 lint: $(VENV)/.development ## check style and layout
 	$(BIN)/ruff check .

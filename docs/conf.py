@@ -1,4 +1,4 @@
-"""How Sphinx builds the documentation: ``python -m sphinx -W --keep-going -b html docs build/docs``."""
+"""How Sphinx builds the documentation: ``python -m sphinx -E -W --keep-going -b html docs build/docs``."""
 
 from __future__ import annotations
 

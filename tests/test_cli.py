@@ -511,12 +511,22 @@ def test_compare(tickwise: Tickwise):
         "structurally_transferable": True,
         "source_structure": [["FG", "F"]],
         "target_structure": [["FG", "F"], ["FG", "F"]],
+        # no side of one is a side of the other, so they are infinitely far from each other
+        "alignment": {
+            "shifts": {"x": 0.0, "z": 0.0, "y": 0.0},
+            "delay": 0.0,
+            "regions": {"x": None, "z": None, "y": None},
+            "windows": 3.4,
+        },
     }
+    # windows: 1, 1, -1 and -11 later, so as late, and 14 remains; with the 3 of the duration it is 17 of 5
     assert tickwise("compare", source, other).out.splitlines() == [
         "structurally equivalent: yes",
         "target structurally transferable from source: yes",
         "source structure: FG & F",
         "target structure: FG & F",
+        "target is displaced by: x 0, z 0, y 0, 0 ticks",
+        "mean difference that remains: x inf, z inf, y inf, 3.4 ticks",
     ]
     assert tickwise("compare", FORMULA, "G[0,2] (x >= 3)").out.splitlines()[1].endswith(": no")
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tickwise.cli.app import COLUMNS, JsonFlag, command, output, print_json
-from tickwise.cli.evidence import page_path, show_explanation, write_page
+from tickwise.cli.evidence import page_path, read_any, show_explanation, write_page
 from tickwise.cli.listing import show_rows
 from tickwise.errors import DataError
 
@@ -37,7 +37,7 @@ def check(
 
     page = page_path(page)
     phi = parse(formula)
-    known, labelled = _read(data)
+    known, labelled = read_any(data)
     if not labelled and (summary or page is not None):
         raise DataError(f"{data} has no labels, which --{'summary' if summary else 'page'} is about; add them")
     found = explain(phi, known) if labelled else None
@@ -61,16 +61,6 @@ def check(
         show_explanation(found)
     if page is not None and output.is_terminal:
         output.print(f"page: {page}")
-
-
-def _read(data: Path) -> tuple[LabelledTrajectories, bool]:
-    """The trajectories, and whether they have labels."""
-    from tickwise.inference.reading import read_trajectories
-
-    try:
-        return read_trajectories(data), True
-    except DataError:  # where it is not for want of labels, this fails again
-        return read_trajectories(data, labelled=False), False
 
 
 def _rows(phi: Formula, known: LabelledTrajectories) -> list[tuple[str, str, float | None]]:

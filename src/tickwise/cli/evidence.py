@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING
 
 from tickwise.cli.app import output
 from tickwise.cli.listing import show_rows
-from tickwise.errors import ConfigurationError
+from tickwise.errors import ConfigurationError, DataError
 
 if TYPE_CHECKING:
     from tickwise.inference.explanation import Confusion, Explanation
+    from tickwise.inference.trajectories import LabelledTrajectories
     from tickwise.inference.validation import Validation
 
 _MOST_LISTED = 20  # mistakes on a terminal; the page and JSON have all
@@ -61,6 +62,16 @@ def show_validation(found: Validation) -> None:
     output.print(found.sentence())
     output.print(f"({found.note})", style="dim")
     show_confusion(found.confusion, "label, held out")
+
+
+def read_any(data: Path) -> tuple[LabelledTrajectories, bool]:
+    """The trajectories, and whether they have labels."""
+    from tickwise.inference.reading import read_trajectories
+
+    try:
+        return read_trajectories(data), True
+    except DataError:  # where it is not for want of labels, this fails again
+        return read_trajectories(data, labelled=False), False
 
 
 def page_path(path: Path | None) -> Path | None:

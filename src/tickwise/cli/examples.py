@@ -21,7 +21,10 @@ EXAMPLES = {
         "tickwise automaton 'F[0,9] (x > 3)' | dot -Tpdf > automaton.pdf",
         "tickwise automaton 'F[0,9] (x > 3)' --format svg > automaton.svg",
     ),
-    "compare": ("tickwise compare 'F[0,9] (x > 1)' 'G[3,5] (y < 2)' --json",),
+    "compare": (
+        "tickwise compare 'F[0,9] (x > 1)' 'G[3,5] (y < 2)' --json",
+        "tickwise compare 'F[0,9] (x > 1)' 'F[3,5] (x > 2)' --picture both.svg",
+    ),
     "report": ("tickwise report runs/all",),
     "effect": ("tickwise effect tau --study case1 --runs 5", "tickwise effect list"),
     "doctor": ("tickwise doctor --json > doctor.json",),

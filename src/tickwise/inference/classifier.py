@@ -17,7 +17,7 @@ from tickwise.inference.exact import ExactSettings
 from tickwise.inference.frames import is_frame, split_frame
 from tickwise.inference.growth import infer_jointly
 from tickwise.inference.objective import ClassWeight
-from tickwise.inference.prior import BoxPrior, Prior
+from tickwise.inference.prior import Prior
 from tickwise.inference.readable import readable
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
@@ -165,7 +165,7 @@ class MITLClassifier:
         weight = _signed_weight(self.class_weight, classes, positive)
         settings = InferenceSettings(self.size, self.rate, self.information_weight, self.depth, weight)
         space = SearchSpace.from_data(data) if self.space is None else self.space
-        prior = self._box_prior(data, space) if self.prior is None else self.prior
+        prior = space.box_prior(data.horizon) if self.prior is None else self.prior
         limits = ExactSettings() if self.limits is None else self.limits
         self.tree_: DecisionTree | None = None
         self.gap_: float | None = None
@@ -209,11 +209,6 @@ class MITLClassifier:
         return LabelledTrajectories(
             states.values[..., columns], states.lengths, labels.astype(np.int8), names, states.ids
         )
-
-    @staticmethod
-    def _box_prior(data: LabelledTrajectories, space: SearchSpace) -> BoxPrior:
-        ranges = {name: (edges[0], edges[-1]) for name, edges in zip(space.variables, space.edges, strict=True)}
-        return BoxPrior(ranges, max(data.horizon, 1))
 
     def predict(self, X: States) -> NDArray[Any]:
         """Predict the positive label where the formula's verdict is not FALSE, else the other one.

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
+from collections.abc import Callable, Sequence
+from itertools import accumulate, pairwise
 
 from tickwise.automata.build import timed_automata
 from tickwise.inference.prior import BoxPrior, MarkovPrior, PathPrior, Prior
@@ -21,39 +23,59 @@ def log_probability(phi: Formula | SDNF, prior: Prior) -> float:
     """The natural logarithm of `probability`, without underflow; -inf where the probability is 0."""
     if isinstance(phi, Constant):
         return 0.0 if phi.value else -math.inf
-    sdnf = phi if isinstance(phi, SDNF) else to_sdnf(phi)
-    automata = timed_automata(sdnf)
-    tables = [automaton.compile() for automaton in automata]
-    predicates = [primitive.predicate for disjunct in sdnf.disjuncts for primitive in disjunct.primitives]
-    chain = prior.chain(predicates)
+    return log_mass([phi if isinstance(phi, SDNF) else to_sdnf(phi)], prior, lambda satisfied: satisfied[0])
+
+
+def log_mass(formulas: Sequence[SDNF], prior: Prior, counts: Callable[[tuple[bool, ...]], bool]) -> float:
+    """The natural logarithm of the probability of a combination of formulas, without underflow.
+
+    Dynamic programming over (chain state x tick-table states of all formulas), reachable part only.
+
+    Args:
+        formulas: The formulas.
+        prior: The prior distribution.
+        counts: Whether a trajectory counts, by which of the formulas it satisfies.
+
+    Returns:
+        The logarithm; -inf where no trajectory counts.
+    """
+    disjuncts = [disjunct for formula in formulas for disjunct in formula.disjuncts]
+    bounds = list(accumulate((len(formula.disjuncts) for formula in formulas), initial=0))
+    tables = [automaton.compile() for formula in formulas for automaton in timed_automata(formula)]
+    chain = prior.chain([primitive.predicate for disjunct in disjuncts for primitive in disjunct.primitives])
     deltas = [table.delta.tolist() for table in tables]
     verdicts = [table.verdict.tolist() for table in tables]
-    widths = [len(disjunct.primitives) for disjunct in sdnf.disjuncts]
+    widths = [len(disjunct.primitives) for disjunct in disjuncts]
     letters = [_split(int(letter), widths) for letter in chain.letters]
     steps = [
         list(zip(chain.indices[low:high].tolist(), chain.weights[low:high].tolist(), strict=True))
         for low, high in zip(chain.indptr[:-1].tolist(), chain.indptr[1:].tolist(), strict=True)
     ]
+
+    def said(u: tuple[int, ...]) -> tuple[int, ...]:
+        each = [verdict[part] for verdict, part in zip(verdicts, u, strict=True)]
+        return tuple(max(each[low:high]) for low, high in pairwise(bounds))
+
     # mass[state, u]: weight of the paths to a chain state that bring the tables to the tuple u before reading it
     start = (0,) * len(tables)
     mass = {(state, start): weight for state, weight in enumerate(chain.initial.tolist()) if weight > 0}
-    factor, accepted_log = 0.0, -math.inf
+    factor, counted_log = 0.0, -math.inf
     for tick in range(chain.horizon + 1):
-        accepted = 0.0
+        counted = 0.0
         moved: defaultdict[tuple[int, tuple[int, ...]], float] = defaultdict(float)
         for (state, u), weight in mass.items():
             after = tuple(delta[part][letter] for delta, part, letter in zip(deltas, u, letters[state], strict=True))
-            said = max(verdict[part] for verdict, part in zip(verdicts, after, strict=True))
-            if said == Verdict.TRUE or (said == Verdict.UNKNOWN and tick == chain.horizon):
-                accepted += weight * float(chain.backward[tick, state])
-            elif said == Verdict.UNKNOWN:
+            known = said(after)
+            if Verdict.UNKNOWN in known and tick < chain.horizon:
                 for successor, step in steps[state]:
                     moved[successor, after] += weight * step / float(chain.scale[tick])
-        if accepted > 0:
-            accepted_log = _log_add(accepted_log, factor + math.log(accepted))
+            elif counts(tuple(verdict != Verdict.FALSE for verdict in known)):
+                counted += weight * float(chain.backward[tick, state])
+        if counted > 0:
+            counted_log = _log_add(counted_log, factor + math.log(counted))
         mass, shift = _rescaled(moved)
         factor += shift
-    return min(accepted_log, 0.0)
+    return min(counted_log, 0.0)
 
 
 def probability(phi: Formula | SDNF, prior: Prior) -> float:

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from tickwise._jit import njit
 from tickwise.errors import ConfigurationError, DataError, UnknownVariableError
 from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
+from tickwise.inference.prior import BoxPrior
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.logic.sdnf import SDNF, Operator, Primitive, SequentialConjunction
 from tickwise.logic.syntax import Bound, Box, Interval, Not
@@ -79,6 +80,11 @@ class SearchSpace:
         """Unions of whole cells of a gridworld: box sides among 0, 1, …, size."""
         edges = tuple(float(edge) for edge in range(size + 1))
         return cls(variables, (edges,) * len(variables), horizon, (False,) * len(variables))
+
+    def box_prior(self, horizon: int) -> BoxPrior:
+        """Independent uniform draws from the ranges of this space, until a horizon in ticks, at least 1."""
+        ranges = {name: (edges[0], edges[-1]) for name, edges in zip(self.variables, self.edges, strict=True)}
+        return BoxPrior(ranges, max(horizon, 1))
 
     @classmethod
     def from_data(cls, data: LabelledTrajectories, horizon: int | None = None) -> SearchSpace:

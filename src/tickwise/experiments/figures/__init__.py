@@ -15,6 +15,7 @@ from tickwise._files import write_bytes
 from tickwise.automata.model import TimedAutomaton
 from tickwise.errors import AutomatonError
 from tickwise.experiments.study import StudySpec
+from tickwise.logic.sdnf import SDNF
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -117,6 +118,22 @@ def draw_automata(automata: Sequence[TimedAutomaton]) -> str:
 
     with _style():
         return _render(draw_alone(automata), "svg", _SVG_METADATA).decode()
+
+
+def draw_overlay(source: SDNF, target: SDNF) -> str:
+    """Draw two formulas over one another, in a panel for each variable.
+
+    Args:
+        source: The source's formula.
+        target: The target's.
+
+    Returns:
+        The SVG text; the same formulas give the same text.
+    """
+    from tickwise.experiments.figures.overlay import draw
+
+    with _style():
+        return _render(draw(source, target), "svg", _SVG_METADATA).decode()
 
 
 @contextmanager
