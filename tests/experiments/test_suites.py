@@ -49,7 +49,8 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_suites_by_name():
-    assert len(find_suite("random").units(Path()).pairs) == 50
+    assert find_suite("random").tasks == 50
+    assert len(find_suite("random", tasks=2).units(Path()).pairs) == 2
     every = find_suite("all", tasks=3, quick=True)
     units = every.units(Path("here"))
     assert [unit.label for unit in units.studies] == ["case1", "case2"]
