@@ -7,7 +7,7 @@ and not before. A source agent learns it on a lake of 4 × 4 cells. On one of 7 
 sees the cell only, one that sees location and clocks too, and one that begins with the source's values by the mapped
 observation.
 
-Needs Stable-Baselines3: pip install "tickwise[sb3]".
+Needs Stable-Baselines3: pip install '.[sb3]'.
 """
 
 from __future__ import annotations

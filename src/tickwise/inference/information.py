@@ -23,7 +23,7 @@ def log_probability(phi: Formula | SDNF, prior: Prior) -> float:
     """The natural logarithm of `probability`, without underflow; -inf where the probability is 0."""
     if isinstance(phi, Constant):
         return 0.0 if phi.value else -math.inf
-    return log_mass([phi if isinstance(phi, SDNF) else to_sdnf(phi)], prior, lambda satisfied: satisfied[0])
+    return log_mass([to_sdnf(phi)], prior, lambda satisfied: satisfied[0])
 
 
 def log_mass(formulas: Sequence[SDNF], prior: Prior, counts: Callable[[tuple[bool, ...]], bool]) -> float:

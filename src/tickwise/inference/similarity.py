@@ -29,7 +29,7 @@ def disagreement(phi: Formula | SDNF, psi: Formula | SDNF, prior: Prior) -> floa
         FormulaError: If a formula has no SDNF.
         UnknownVariableError: If a formula names a variable that the prior does not have.
     """
-    return math.exp(log_mass(_both(phi, psi), prior, lambda satisfied: satisfied[0] != satisfied[1]))
+    return math.exp(log_mass([to_sdnf(phi), to_sdnf(psi)], prior, lambda satisfied: satisfied[0] != satisfied[1]))
 
 
 def dissimilarity(phi: Formula | SDNF, psi: Formula | SDNF, prior: Prior) -> float:
@@ -51,13 +51,8 @@ def dissimilarity(phi: Formula | SDNF, psi: Formula | SDNF, prior: Prior) -> flo
         FormulaError: If a formula has no SDNF.
         UnknownVariableError: If a formula names a variable that the prior does not have.
     """
-    both = _both(phi, psi)
+    both = [to_sdnf(phi), to_sdnf(psi)]
     either = log_mass(both, prior, any)
     if math.isinf(either):
         return 0.0
     return min(1.0, math.exp(log_mass(both, prior, lambda satisfied: satisfied[0] != satisfied[1]) - either))
-
-
-def _both(phi: Formula | SDNF, psi: Formula | SDNF) -> tuple[SDNF, SDNF]:
-    first, second = (each if isinstance(each, SDNF) else to_sdnf(each) for each in (phi, psi))
-    return first, second

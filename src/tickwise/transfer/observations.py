@@ -13,10 +13,10 @@ from tickwise.automata.mapping import bijections
 from tickwise.automata.ticks import TickTable
 from tickwise.envs.wrappers import ExtendedState, Labelled
 from tickwise.envs.wrappers.forms import clipped, count_of, is_vector, observation_of
-from tickwise.errors import AutomatonError, ConfigurationError
+from tickwise.errors import ConfigurationError
 from tickwise.logic.semantics import holds
 from tickwise.logic.syntax import Box, Predicate
-from tickwise.transfer.qtransfer import most_alike, similar_valuations
+from tickwise.transfer.qtransfer import check_copies, most_alike, similar_valuations
 
 Landmarks = tuple[Sequence[NDArray[np.float64]], Sequence[NDArray[np.float64]]]
 """What is compared relative to in the source and in the target, for each disjunct ``(primitives, features)``."""
@@ -70,6 +70,7 @@ class ObservationMap:
         self.source, self.target = source, target
         self._move = move
         self._candidates = _candidates(source, target) if move is None else None
+        self._features_of = _labelled(target).features_of if move is None else None
         self._similar: list[int] = []  # for each of the target's table states the source's
         self._pairs: list[_Pair] = []  # and what the rest of the observation is compared relative to
         sources = source.monitor.tables
@@ -98,7 +99,8 @@ class ObservationMap:
         space, names = self.source.env.observation_space, self.source.monitor.variables
         if self._candidates is None:
             return clipped(space, np.asarray(observation) + (pair.near - pair.far))
-        features = _labelled(self.target).features_of(observation)[None, :]
+        assert self._features_of is not None
+        features = self._features_of(observation)[None, :]
         differs = holds(pair.target, features, names)[:, None] != holds(pair.source, self._candidates, names)
         return observation_of(space, int(most_alike(self._candidates - pair.near, features - pair.far, differs)[0]))
 
@@ -133,11 +135,7 @@ def _check(source: ExtendedState, target: ExtendedState) -> None:
     for name, env in (("source", source), ("target", target)):
         if not isinstance(env, ExtendedState):
             raise ConfigurationError(f"the {name} is no ExtendedState; wrap it, with the formula of its task, last")
-    if len(target.monitor.tables) % len(source.monitor.tables):
-        raise AutomatonError(
-            f"the target's formula has {len(target.monitor.tables)} disjuncts and the source's "
-            f"{len(source.monitor.tables)}, so it is not structurally transferable (Definition 7); use a multiple"
-        )
+    check_copies(source.monitor.tables, target.monitor.tables)
     if source.monitor.variables != target.monitor.variables:
         raise ConfigurationError(
             f"the source's features are {', '.join(source.monitor.variables)} and the target's "

@@ -153,6 +153,19 @@ def similar_valuations(source: TickTable, target: TickTable, xi: Bijections) -> 
     return similar
 
 
+def check_copies(source: Sequence[TickTable], target: Sequence[TickTable]) -> None:
+    """Line 1, in number: the target has as many disjuncts as the source, or several times as many (Definition 7).
+
+    Raises:
+        AutomatonError: If it has not.
+    """
+    if len(target) % len(source):
+        raise AutomatonError(
+            f"the target's formula has {len(target)} disjuncts and the source's {len(source)}, so it is not "
+            "structurally transferable (Definition 7); use a multiple"
+        )
+
+
 def _check(
     source_mdp: TabularMDP,
     source_memory: Memory,
@@ -162,11 +175,7 @@ def _check(
 ) -> None:
     if not (source_memory.tables and target_memory.tables):
         raise DataError("extended Q-functions need memories made of timed automata; use automaton_memory")
-    if len(target_memory.tables) % len(source_memory.tables):
-        raise AutomatonError(
-            f"the target's formula has {len(target_memory.tables)} disjuncts and the source's "
-            f"{len(source_memory.tables)}, so it is not structurally transferable (Definition 7); use a multiple"
-        )
+    check_copies(source_memory.tables, target_memory.tables)
     if len(source_mdp.variables) != len(target_mdp.variables):
         raise DataError(
             f"the source's world has {len(source_mdp.variables)} coordinates and the target's "

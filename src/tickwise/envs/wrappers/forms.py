@@ -192,23 +192,28 @@ def numbering(space: gymnasium.Space[Any], what: str) -> tuple[int, Callable[[An
     Raises:
         ConfigurationError: If the space is not finite.
     """
+    count = count_of(space)
+    if count is None:
+        raise ConfigurationError(
+            f"{what} needs observations that are whole numbers, a Discrete or MultiDiscrete space, not {space}; use "
+            "another form, or map the observation with gymnasium.wrappers.TransformObservation"
+        )
     if isinstance(space, spaces.Discrete):
-        return int(space.n), lambda observation: _counted(space, observation)
-    if isinstance(space, spaces.MultiDiscrete) and len(space.shape) == 1:
-        count = math.prod(space.nvec.tolist())
-        if count >= _MOST_NUMBERS:
-            raise ConfigurationError(f"{what} needs observations that can be numbered, and there are {count}")
-        places = np.concatenate([np.cumprod(space.nvec[::-1], dtype=np.int64)[::-1][1:], [1]])
-        return count, lambda observation: _counted(space, observation) @ places
-    raise ConfigurationError(
-        f"{what} needs observations that are whole numbers, a Discrete or MultiDiscrete space, not {space}; use "
-        "another form, or map the observation with gymnasium.wrappers.TransformObservation"
-    )
+        return count, lambda observation: _counted(space, observation)
+    if count >= _MOST_NUMBERS:
+        raise ConfigurationError(f"{what} needs observations that can be numbered, and there are {count}")
+    assert isinstance(space, spaces.MultiDiscrete)
+    places = np.concatenate([np.cumprod(space.nvec[::-1], dtype=np.int64)[::-1][1:], [1]])
+    return count, lambda observation: _counted(space, observation) @ places
 
 
 def count_of(space: gymnasium.Space[Any]) -> int | None:
     """How many observations a space has, or None if they have no numbers."""
-    return numbering(space, "")[0] if isinstance(space, (spaces.Discrete, spaces.MultiDiscrete)) else None
+    if isinstance(space, spaces.Discrete):
+        return int(space.n)
+    if isinstance(space, spaces.MultiDiscrete) and len(space.shape) == 1:
+        return int(math.prod(space.nvec.tolist()))
+    return None
 
 
 def is_vector(space: gymnasium.Space[Any]) -> bool:
