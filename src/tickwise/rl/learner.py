@@ -1,0 +1,83 @@
+"""The interface of all forms of learning: what a study, the closed loop and an experiment need of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.rl.qlearning import Problem, QSettings, collect
+
+
+class Learner(Protocol):
+    """What learns one problem, a number of episodes at a time; a later call goes on where an earlier one ended."""
+
+    @property
+    def problem(self) -> Problem:
+        """What is learned."""
+        ...
+
+    @property
+    def q(self) -> NDArray[np.float32]:
+        """The table whose greedy policy, ties to the lower action, is what was learned so far.
+
+        It has the shape ``(memory states, states, actions)``; `tickwise.rl.qlearning.evaluate` plays it.
+        """
+        ...
+
+    def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Learn for some episodes.
+
+        Args:
+            rng: The generator that all draws come from.
+            episodes: The number of episodes.
+
+        Returns:
+            The undiscounted return of each episode, shape ``(episodes,)``, and its MDP states with -1 after its end,
+            shape ``(episodes, horizon + 1)``.
+        """
+        ...
+
+
+class LearningForm(Protocol):
+    """A form of learning as data: its settings, which make a learner of a problem."""
+
+    def learner(self, problem: Problem, q: NDArray[np.float32] | None = None) -> Learner:
+        """What learns a problem in this form.
+
+        Args:
+            problem: What to learn.
+            q: Values to begin with, such as transferred ones, shape ``(memory states, states, actions)``; they are
+                copied. None for those of the settings.
+        """
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class QLearning:
+    """Q-learning (Section IV-B, Step 3), the paper's form.
+
+    Attributes:
+        settings: Learning rate, discount, exploration and initial values.
+    """
+
+    settings: QSettings = field(default_factory=QSettings)
+
+    def learner(self, problem: Problem, q: NDArray[np.float32] | None = None) -> QLearner:
+        """What learns a problem by Q-learning; see `LearningForm`."""
+        return QLearner(problem, problem.initial_q(self.settings) if q is None else q.copy(), self.settings)
+
+
+@dataclass(slots=True, eq=False)
+class QLearner:
+    """Q-learning as a `Learner`."""
+
+    problem: Problem
+    q: NDArray[np.float32]
+    settings: QSettings
+
+    def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Learn for some episodes; see `Learner`."""
+        return collect(self.problem, self.q, self.settings, rng, episodes)

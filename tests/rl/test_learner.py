@@ -1,0 +1,33 @@
+"""Tests of the interface of learning forms."""
+
+import numpy as np
+
+from tickwise.envs.catalog import CASE_STUDY_1_TARGET
+from tickwise.rl.learner import QLearning
+from tickwise.rl.qlearning import Problem, QSettings, learn
+from tickwise.rl.states import tau_memory
+
+
+def a_problem() -> Problem:
+    mdp = CASE_STUDY_1_TARGET.mdp()
+    return Problem(mdp, CASE_STUDY_1_TARGET.task_table(), tau_memory(mdp, 2))
+
+
+def test_q_learning_is_what_the_function_does() -> None:
+    problem, settings = a_problem(), QSettings(initial=20.0)
+    learner = QLearning(settings).learner(problem)
+    rng = np.random.default_rng(1)
+    parts = [learner.learn(rng, episodes) for episodes in (3, 4)]
+    q = problem.initial_q(settings)
+    returns = learn(problem, q, settings, np.random.default_rng(1), 7)
+    assert np.array_equal(np.concatenate([part[0] for part in parts]), returns)
+    assert all(part[1].shape[1] == problem.task.horizon + 1 for part in parts)
+    assert np.array_equal(learner.q, q)
+
+
+def test_given_values_are_copied() -> None:
+    problem = a_problem()
+    q = problem.initial_q(QSettings(initial=3.0))
+    learner = QLearning().learner(problem, q)
+    learner.learn(np.random.default_rng(0), 2)
+    assert (q == 3.0).all() and (learner.q != 3.0).any()
