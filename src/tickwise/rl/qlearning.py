@@ -69,6 +69,23 @@ class Problem:
             task.terminated, task.horizon, memory.start, memory.delta, memory.letter,
         )  # fmt: skip
 
+    def terminated(self, paths: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Which episodes the task ended, as an environment says at the last step; the deadline alone does not.
+
+        Args:
+            paths: MDP states of each episode, -1 after its end, shape ``(episodes, horizon + 1)``.
+
+        Returns:
+            Shape ``(episodes,)``.
+        """
+        task = self.task
+        w = task.delta[0, task.letter[paths[:, 0]]]
+        ended = np.zeros(len(paths), dtype=np.bool_)
+        for s in paths[:, 1:].T:
+            w = np.where(s >= 0, task.delta[w, task.letter[s]], w)
+            ended |= (s >= 0) & task.terminated[w]
+        return ended
+
     def initial_q(self, settings: QSettings) -> NDArray[np.float32]:
         """A fresh Q-table at the settings' initial value, shape ``(memory states, states, actions)``."""
         shape = (self.memory.n_states, self.mdp.n_states, self.mdp.n_actions)

@@ -1,0 +1,220 @@
+"""Model-based learning in the extended state: the world's transitions are counted, and planned on with the automaton.
+
+The automaton's dynamics are known, so that a step teaches what the world does whatever the automaton's state was: the
+counts are over (state, action, outcome) alone and shared by all extended states. So are those of the rewards but for
+what the automaton says on arriving; a formula that says what is rewarded makes that enough.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.envs.tabulate import TabularMDP
+from tickwise.errors import ConfigurationError
+from tickwise.rl.planning import CLASSES, Counts, imagine, plan, play
+from tickwise.rl.qlearning import Problem
+from tickwise.rl.stream import put_back, take_stream
+from tickwise.rl.unrolled import Unrolled, unroll
+
+_FALSE = slice(0, 2)  # the classes of what the automaton says is false
+
+
+def no_counts(mdp: TabularMDP) -> Counts:
+    """The counts of a world of which nothing was seen."""
+    by_class = (CLASSES, mdp.n_states)
+    return Counts(
+        np.zeros(mdp.successor.shape, np.int32),
+        np.zeros(by_class),
+        np.zeros(by_class, np.int32),
+        np.zeros(by_class, np.int32),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class ModelBased:
+    """Model-based learning with optimism: what was not met often enough is taken to be as good as anything.
+
+    Attributes:
+        known: A state and an action count as known once they were met so often.
+        hope: The reward that satisfying the formula is taken to give before any such reward was seen, in units of
+            reward.
+        pooling: The weight, in arrivals, of the mean reward of all states where the automaton says the same in the
+            estimate for one of them.
+        form: Which form of learning it is.
+
+    Raises:
+        ConfigurationError: If a setting is out of range.
+    """
+
+    known: int = 1
+    hope: float = 50.0
+    pooling: float = 0.01
+    form: str = field(default="model", init=False)
+
+    def __post_init__(self) -> None:
+        if self.known < 1:
+            raise ConfigurationError(f"known is {self.known}; a pair is known once it was met 1 time or more often")
+        if not (np.isfinite(self.hope) and 0 < self.pooling < np.inf):
+            raise ConfigurationError(
+                f"hope is {self.hope} and pooling {self.pooling}; use a finite number, and one above 0"
+            )
+
+    def learner(
+        self, problem: Problem, q: NDArray[np.float32] | None = None, counts: Counts | None = None
+    ) -> ModelLearner:
+        """What learns a problem on a model; see `tickwise.rl.learner.LearningForm`.
+
+        Args:
+            problem: What to learn; the tick is put into its memory.
+            q: What pairs of a state and an action that are not known yet are taken to be worth, such as transferred
+                values, shape ``(memory states, states, actions)``; None for the best that was ever seen.
+            counts: What is known of the world already; it is gone on with, not copied.
+        """
+        unrolled = unroll(problem.memory, problem.task.horizon)
+        counts = no_counts(problem.mdp) if counts is None else counts
+        given = np.empty((0, 1, 1), np.float32) if q is None else q[unrolled.state]
+        return ModelLearner(Problem(problem.mdp, problem.task, unrolled.memory), unrolled, counts, self, given)
+
+
+@dataclass(slots=True, eq=False)
+class ModelLearner:
+    """A world as far as it was met, and plans on it; a `tickwise.rl.learner.Learner`.
+
+    Attributes:
+        problem: What is learned; its memory has the tick in it.
+        unrolled: That memory with what its states mean.
+        counts: What was met.
+        settings: The settings.
+        given: Values of what is not known yet; of no memory states where there are none.
+        q: The values of the empirical model.
+    """
+
+    problem: Problem
+    unrolled: Unrolled
+    counts: Counts
+    settings: ModelBased
+    given: NDArray[np.float32]
+    q: NDArray[np.float32] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.q = np.zeros((self.problem.memory.n_states, self.problem.mdp.n_states, self.problem.mdp.n_actions), "f4")
+        self.replan()
+
+    def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Play some episodes, with a new plan after each; see `tickwise.rl.learner.Learner`."""
+        returns = np.empty(episodes, np.float32)
+        paths = np.empty((episodes, self.problem.task.horizon + 1), np.int32)
+        for episode in range(episodes):
+            returns[episode : episode + 1], paths[episode : episode + 1] = self.play(rng)
+            self.replan()
+        return returns, paths
+
+    def play(
+        self, rng: np.random.Generator, q: NDArray[np.float32] | None = None
+    ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Play one episode greedily, ties at random, and count what is met.
+
+        Args:
+            rng: The generator that all draws come from.
+            q: The table to play; None for the plan.
+
+        Returns:
+            As `learn`, for one episode.
+        """
+        paths = np.empty((1, self.problem.task.horizon + 1), np.int32)
+        stream = take_stream(rng)
+        table = self.q if q is None else q
+        arguments: tuple[Any, ...] = (
+            *self.problem.arrays, self.unrolled.verdict, stream, table, self.counts, paths[0],
+        )  # fmt: skip
+        total = play(*arguments)
+        put_back(rng, stream)
+        return np.array([total], np.float32), paths
+
+    def replan(self) -> None:
+        """Plan for the rewards on what was counted so far."""
+        reward, ends = expectations(self.counts, self.settings)
+        best = np.maximum(reward.max(axis=1), 0.0)
+        left = self.problem.task.horizon - self.unrolled.tick
+        worth = np.maximum(left - 1, 0) * best[::2].max() + best[1::2].max()
+        sweep(self.problem, self.unrolled, self.counts, self.settings.known, reward, ends, worth, self.given, self.q)
+
+
+def expectations(counts: Counts, settings: ModelBased) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The expected reward on arriving, and the probability that the episode ends there, by class and state.
+
+    Returns:
+        Two arrays of shape ``(CLASSES, states)``.
+    """
+    met = counts.arrivals.sum(axis=1, keepdims=True)
+    hoped = np.zeros((CLASSES, 1))
+    hoped[1::2] = settings.hope  # at the last tick
+    hoped[_FALSE] = 0.0
+    pooled = np.where(met > 0, counts.rewards.sum(axis=1, keepdims=True) / np.maximum(met, 1), hoped)
+    ending = counts.ends.sum(axis=1, keepdims=True) / np.maximum(met, 1)
+    weight = counts.arrivals + settings.pooling
+    return (counts.rewards + settings.pooling * pooled) / weight, (counts.ends + settings.pooling * ending) / weight
+
+
+def sweep(
+    problem: Problem,
+    unrolled: Unrolled,
+    counts: Counts,
+    known: int,
+    reward: NDArray[np.float64],
+    ends: NDArray[np.float64],
+    worth: NDArray[np.float64],
+    given: NDArray[np.float32],
+    q: NDArray[np.float32],
+) -> None:
+    """Plan on what was counted; the arguments are those of `tickwise.rl.planning.plan`."""
+    memory = problem.memory
+    plan(
+        problem.mdp.successor, memory.delta, memory.letter, unrolled.tick, unrolled.verdict, problem.task.horizon,
+        counts.outcomes, known, reward, ends, worth, given, q,
+    )  # fmt: skip
+
+
+def satisfying_plan(learner: ModelLearner) -> NDArray[np.float32]:
+    """Plan to satisfy the memory's formula, in the world as far as it was met; rewards play no part.
+
+    Args:
+        learner: What was met. What is not known is taken to satisfy.
+
+    Returns:
+        The probability that the formula is satisfied, in the weak view, shape ``(memory states, states, actions)``.
+    """
+    problem, unrolled = learner.problem, learner.unrolled
+    q = np.zeros_like(learner.q)
+    reward = np.zeros((CLASSES, problem.mdp.n_states))
+    reward[[3, 5]] = 1.0  # unknown or true at the last tick
+    hope, nothing = np.where(unrolled.verdict < 0, 0.0, 1.0), np.empty((0, 1, 1), np.float32)
+    sweep(problem, unrolled, learner.counts, learner.settings.known, reward, np.zeros_like(reward), hope, nothing, q)
+    return q
+
+
+def imagined(
+    learner: ModelLearner, starts: NDArray[np.int32], episodes: int, rng: np.random.Generator
+) -> NDArray[np.int32]:
+    """Episodes of the plan in the world as far as it was met; see `tickwise.rl.planning.imagine`.
+
+    Args:
+        learner: The plan, and what was met.
+        starts: MDP states, one of which is drawn at the beginning of each episode, shape ``(n,)``.
+        episodes: How many.
+        rng: The generator that all draws come from.
+
+    Returns:
+        MDP states, shape ``(episodes, horizon + 1)``.
+    """
+    problem, memory = learner.problem, learner.problem.memory
+    paths = np.empty((episodes, problem.task.horizon + 1), np.int32)
+    stream = take_stream(rng)
+    arrays = (problem.mdp.successor, memory.start, memory.delta, memory.letter)
+    imagine(starts, *arrays, learner.counts.outcomes, stream, learner.q, paths)
+    put_back(rng, stream)
+    return paths
