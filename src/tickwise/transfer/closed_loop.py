@@ -1,0 +1,346 @@
+"""The closed loop: collecting, inferring and learning in the target task at once, from the source's structure on.
+
+The paper collects thousands of episodes, infers φ^T once (Section IV-B, Step 2) and learns then. Here episodes are
+played to satisfy formulas of the source's structure that nothing has contradicted yet, such that as many of them as can
+be are put to the test. Once some episodes were good, a formula that agrees with all is acted on and tested on fresh
+ones. If it misjudges them, the next formula follows, and values go from one to the next by ξ (Algorithm 2).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tickwise.errors import ConfigurationError, DataError
+from tickwise.inference.exact import ExactSettings
+from tickwise.inference.growth import infer_jointly
+from tickwise.inference.hypotheses import Hypotheses
+from tickwise.inference.objective import formula_signature
+from tickwise.inference.prior import Prior
+from tickwise.inference.space import SearchSpace
+from tickwise.inference.tree import InferenceSettings
+from tickwise.logic.sdnf import SDNF
+from tickwise.rl.learner import Learner, LearningForm
+from tickwise.rl.model import ModelBased, ModelLearner, imagined, no_counts, satisfying_plan
+from tickwise.rl.planning import Counts
+from tickwise.rl.qlearning import Problem
+from tickwise.rl.states import DisjunctChoice, automaton_memory, nearest_centroid
+from tickwise.transfer.episodes import Episodes, Good
+from tickwise.transfer.hypothesis import tick_tables
+from tickwise.transfer.qtransfer import transfer_q
+
+_FAILURES = 3  # selections without a satisfying formula, one after the other, before another copy is tried
+_MARGIN = 0.02  # by how much another formula has to promise more, as a probability, to be tried
+_TRIES = 6  # formulas that are tried because they promise more
+
+
+@dataclass(frozen=True, slots=True)
+class LoopSettings:
+    """How the closed loop goes about it.
+
+    Attributes:
+        form: How it learns while it acts on a formula.
+        batch: Explored episodes between two selections of hypotheses.
+        hypotheses: How many formulas are kept that agree best with the episodes.
+        candidates: How many of them are planned for before an explored episode.
+        imagined: Episodes of each plan that are imagined, to see how many hypotheses accept them.
+        random: The share of explored episodes whose actions are random.
+        rounds: Selections of hypotheses before a formula is acted on.
+        positives: Good episodes before a formula is acted on.
+        fresh: Fresh episodes that a formula has to judge rightly, but for a share of 1 - ζ, for collecting to end; at
+            least `positives` of them good.
+        patience: Good episodes that are enough to say that no number of copies of the structure is satisfying.
+
+    Raises:
+        ConfigurationError: If a number is out of range.
+    """
+
+    form: LearningForm = field(default_factory=ModelBased)
+    batch: int = 10
+    hypotheses: int = 4_000
+    candidates: int = 6
+    imagined: int = 4
+    random: float = 0.1
+    rounds: int = 4
+    positives: int = 3
+    fresh: int = 30
+    patience: int = 40
+
+    def __post_init__(self) -> None:
+        counts = ("batch", "hypotheses", "candidates", "imagined", "rounds", "positives", "fresh", "patience")
+        for name in counts:
+            if getattr(self, name) < 1:
+                raise ConfigurationError(f"{name} of the closed loop is {getattr(self, name)}; use 1 or more")
+        if not 0 <= self.random <= 1:
+            raise ConfigurationError(f"random of the closed loop is {self.random}; use a share from 0 to 1")
+
+
+@dataclass(slots=True)
+class Attempt:
+    """A formula that was acted on.
+
+    Attributes:
+        formula: The formula.
+        begun: Episodes before it was acted on.
+        episodes: Episodes that it was acted on for, so far.
+        wrong: How many of them it misjudged.
+        good: How many of them were good.
+    """
+
+    formula: SDNF
+    begun: int
+    episodes: int = 0
+    wrong: int = 0
+    good: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What the closed loop knows of the target task beforehand.
+
+    Attributes:
+        problem: The world and the hidden task; what the world does is learned, and of the task only rewards and ends
+            are seen.
+        prior: The prior of the information gain.
+        space: What boxes and times may be chosen.
+        settings: ζ, ϱ_th and λ.
+        is_good: Which episodes are good.
+        choose: Chooses the disjunct at the start of an episode.
+    """
+
+    problem: Problem
+    prior: Prior
+    space: SearchSpace
+    settings: InferenceSettings
+    is_good: Good
+    choose: DisjunctChoice = nearest_centroid
+
+    def extended(self, formula: SDNF) -> Problem:
+        """The problem on the extended states of a formula."""
+        mdp, task = self.problem.mdp, self.problem.task
+        return Problem(mdp, task, automaton_memory(mdp, tick_tables(formula, task.horizon), self.choose))
+
+
+class ClosedLoop:
+    """Collects, infers and learns at once; a `tickwise.rl.learner.Learner` whose memory follows its formula.
+
+    Args:
+        target: The target task.
+        source: φ^S, whose structure is looked for first.
+        settings: How to go about it.
+        rng: Draws hypotheses; episodes draw from the generator that `learn` is given.
+
+    Attributes:
+        episodes: All episodes so far.
+        attempts: The formulas that were acted on, in order.
+        collected: Episodes until a formula was satisfying on fresh episodes for the first time; None until then.
+        transferable: Whether the formulas have the source's structure, which holds until it is refuted.
+        reason: Why not, in one sentence; empty where it is.
+    """
+
+    def __init__(self, target: Target, source: SDNF, settings: LoopSettings, rng: np.random.Generator) -> None:
+        self.target, self.settings, self.rng = target, settings, rng
+        self.episodes = Episodes(target.problem, target.is_good)
+        self.hypotheses = Hypotheses(source, target.space, target.prior, settings.hypotheses, rng)
+        self.counts: Counts = no_counts(target.problem.mdp)
+        self.attempts: list[Attempt] = []
+        self.collected: int | None = None
+        self.transferable, self.reason = True, ""
+        self._acting: Attempt | None = None
+        self._learner: Learner = self._model(source)
+        self._judged: deque[bool] = deque(maxlen=settings.fresh)
+        self._explored = self._failed = self._tried = 0
+
+    @property
+    def problem(self) -> Problem:
+        """The target task on the extended states of the formula that was acted on last; at first, of the source's."""
+        return self._learner.problem
+
+    @property
+    def q(self) -> NDArray[np.float32]:
+        """The values on these states, shape ``(memory states, states, actions)``."""
+        return self._learner.q
+
+    @property
+    def formula(self) -> SDNF | None:
+        """φ^T, the formula that is acted on; None while there is none."""
+        return None if self._acting is None else self._acting.formula
+
+    def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """Go on for some episodes; see `tickwise.rl.learner.Learner`."""
+        parts = [self._explore(rng) if self._acting is None else self._act(rng) for _ in range(episodes)]
+        return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+
+    # collecting
+
+    def _explore(self, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """One episode that puts as many hypotheses as can be to the test; after a batch of them, a selection."""
+        if rng.random() < self.settings.random:
+            plan = self._model(self.hypotheses.source)
+            played = plan.play(rng, np.zeros_like(plan.q))
+        else:
+            played = self._most_probable().play(rng)
+        self.episodes.add(*played)
+        self._explored += 1
+        if self._explored % self.settings.batch == 0:
+            self.hypotheses.update(*self.episodes.labelled())
+            self._infer()
+        return played
+
+    def _most_probable(self) -> ModelLearner:
+        """The plan to satisfy a hypothesis whose imagined episodes most of the hypotheses accept."""
+        best = self.hypotheses.best
+        plans = [self._model(formula) for formula in self._some(best, self.settings.candidates)]
+        for plan in plans:
+            plan.q[:] = satisfying_plan(plan)
+        return max(plans, key=lambda plan: self._mass(plan, best, self.settings.imagined))
+
+    def _some(self, best: NDArray[np.float64], most: int) -> list[SDNF]:
+        rows = self.rng.choice(len(best), min(most, len(best)), replace=False)
+        return [self.hypotheses.formula(best[row]) for row in rows]
+
+    def _mass(self, plan: ModelLearner, among: NDArray[np.float64], episodes: int) -> float:
+        """The share of hypotheses that accept an imagined episode of a plan: how probably it is good."""
+        paths = imagined(plan, self.episodes.starts, episodes, self.rng)
+        return self.hypotheses.mass(self.episodes.trajectories(paths, np.ones(len(paths), np.int8)), among)
+
+    def _model(self, formula: SDNF) -> ModelLearner:
+        """Plans on the world as far as it was met, with a formula's automaton."""
+        form = self.settings.form if isinstance(self.settings.form, ModelBased) else ModelBased()
+        return form.learner(self.target.extended(formula), counts=self.counts)
+
+    # inferring
+
+    def _infer(self) -> None:
+        """Act on a formula that is satisfying on all episodes, if there is one (Problem 1, Step 2)."""
+        good = self.episodes.good
+        if good.sum() < self.settings.positives or good.all():
+            return
+        data, weights = self.episodes.labelled()
+        self.hypotheses.update(data, weights, self.settings.rounds)
+        if not self._satisfying:
+            self._failed += 1
+            if self._failed % _FAILURES == 0:
+                self._grow(int(good.sum()))
+        if self._satisfying:
+            self._failed = 0
+            self._act_on(self._most_sure())
+
+    @property
+    def _satisfying(self) -> bool:
+        return bool(self.hypotheses.errors.min() <= 1 - self.target.settings.rate)
+
+    def _grow(self, good: int) -> None:
+        """One more copy of the structure, or the end of the supposition that it is the source's."""
+        hypotheses, (data, weights) = self.hypotheses, self.episodes.labelled()
+        if (hypotheses.copies + 1) * hypotheses.source.size <= self.target.settings.size:
+            before = hypotheses.copies, hypotheses.positions, hypotheses.errors
+            hypotheses.grow(data, weights)
+            hypotheses.update(data, weights, 3 * self.settings.rounds)
+            if not self._satisfying:
+                hypotheses.copies, hypotheses.positions, hypotheses.errors = before
+        if not self._satisfying and self.transferable and good >= self.settings.patience:
+            self._give_up()
+
+    def _give_up(self) -> None:
+        """Go on without the source: its structure does not say the target's rule."""
+        rate, settings = 1 - float(self.hypotheses.errors.min()), self.target.settings
+        self.transferable = False
+        self.reason = (
+            f"Logical transferability is not identified: the best formula of the source's structure judges {rate:.1%} "
+            f"of the target's episodes rightly, below the {settings.rate:.1%} that are asked for."
+        )
+        data, _ = self.episodes.labelled(prefixes=False)
+        limits = ExactSettings(joint=True, seconds=2.0)
+        balanced = replace(settings, class_weight="balanced")
+        try:
+            fit = infer_jointly(data, self.target.prior, self.target.space, balanced, limits)
+        except DataError:  # nothing tells them apart; more episodes may
+            return
+        space, prior = self.target.space, self.target.prior
+        self.hypotheses = Hypotheses(fit.formula, space, prior, self.settings.hypotheses, self.rng)
+        self.hypotheses.positions[0] = space.encode(fit.formula)
+        self.hypotheses.update(*self.episodes.labelled(), self.settings.rounds)
+
+    def _most_sure(self) -> SDNF:
+        """Of the hypotheses that agree best, the one whose plan for the rewards most of them accept."""
+        best = self.hypotheses.best
+        masses = {
+            formula: self._mass(self._model(formula), best, 4 * self.settings.imagined)
+            for formula in self._some(best, 4 * self.settings.candidates)
+        }
+        return max(masses, key=masses.__getitem__)
+
+    def _most_promising(self) -> SDNF | None:
+        """A hypothesis that agrees as well and could be satisfied clearly more often; None if there is none."""
+        formula = self.formula
+        assert formula is not None
+        others = self._some(self.hypotheses.best, 4 * self.settings.candidates)
+        promises = {each: self._promise(each) for each in dict.fromkeys([formula, *others])}
+        found = max(promises, key=promises.__getitem__)
+        return found if promises[found] > promises[formula] + _MARGIN else None
+
+    def _promise(self, formula: SDNF) -> float:
+        """The probability to satisfy a formula, in the world as far as it was met."""
+        plan, starts = self._model(formula), self.episodes.starts
+        values = satisfying_plan(plan)[plan.problem.memory.start[starts], starts]
+        return float(values.max(axis=1).mean())
+
+    # acting
+
+    def _act_on(self, formula: SDNF) -> None:
+        """Go on with a formula, with what was learned on the one before."""
+        problem, form, before = self.target.extended(formula), self.settings.form, self._learner
+        if isinstance(form, ModelBased):
+            self._learner = form.learner(problem, counts=self.counts)
+        elif self._acting is None and not self.attempts:
+            self._learner = form.learner(problem)
+        else:
+            mdp, fallback = problem.mdp, float(np.median(before.q))
+            q = transfer_q(mdp, before.problem.memory, before.q, mdp, problem.memory, fallback)
+            self._learner = form.learner(problem, q)
+        self._acting = Attempt(formula, len(self.episodes))
+        self.attempts.append(self._acting)
+        self._judged.clear()
+
+    def _act(self, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """One episode of learning on the formula, which it has to judge rightly."""
+        attempt = self._acting
+        assert attempt is not None
+        played = self._learner.learn(rng, 1)
+        good = bool(self.episodes.add(*played)[0])
+        path = self.episodes.trajectories(played[1], np.ones(1, np.int8))
+        right = good == bool(formula_signature(attempt.formula, path)[0])
+        self._judged.append(right)
+        attempt.episodes, attempt.good = attempt.episodes + 1, attempt.good + good
+        attempt.wrong += not right
+        fresh = self.settings.fresh
+        if self._judged.count(False) > (1 - self.target.settings.rate) * fresh:
+            self._refute()
+        elif attempt.episodes % fresh == 0:
+            self._review(attempt)
+        return played
+
+    def _refute(self) -> None:
+        """The formula misjudges too much: another one, or more exploration."""
+        self._acting = None
+        self._infer()
+
+    def _review(self, attempt: Attempt) -> None:
+        """After as many fresh episodes as a test takes: it is passed, nothing good comes, or another promises more."""
+        if attempt.good < self.settings.positives:
+            if attempt.episodes >= 3 * self.settings.fresh:
+                self._acting = None  # nothing is wrong with it, and nothing good comes of it
+            return
+        if self._tried < _TRIES:
+            self._tried += 1
+            self.hypotheses.update(*self.episodes.labelled(), self.settings.rounds)
+            other = self._most_promising() if self._satisfying else None
+            if other is not None:
+                self._act_on(other)
+                return
+        if self.collected is None:
+            self.collected = len(self.episodes)
