@@ -1,8 +1,10 @@
 """Tests of the interface of learning forms."""
 
 import numpy as np
+import pytest
 
 from tickwise.envs.catalog import CASE_STUDY_1_TARGET
+from tickwise.errors import ConfigurationError
 from tickwise.rl.learner import QLearning
 from tickwise.rl.qlearning import Problem, QSettings, learn
 from tickwise.rl.states import tau_memory
@@ -30,4 +32,10 @@ def test_given_values_are_copied() -> None:
     q = problem.initial_q(QSettings(initial=3.0))
     learner = QLearning().learner(problem, q)
     learner.learn(np.random.default_rng(0), 2)
-    assert (q == 3.0).all() and (learner.q != 3.0).any()
+    assert (q == 3.0).all()
+    assert (learner.q != 3.0).any()
+
+
+def test_settings_under_the_name_of_another_form_are_refused() -> None:
+    with pytest.raises(ConfigurationError, match="the form of QLearning is 'q', not 'model'; leave it out"):
+        QLearning(form="model")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise.errors import ConfigurationError
 from tickwise.rl.qlearning import Problem, QSettings, collect
 
 
@@ -44,6 +45,11 @@ class Learner(Protocol):
 class LearningForm(Protocol):
     """A form of learning as data: its settings, which make a learner of a problem."""
 
+    @property
+    def form(self) -> str:
+        """The name of the form, so that its settings as plain data tell which form they are of."""
+        ...
+
     def learner(self, problem: Problem, q: NDArray[np.float32] | None = None) -> Learner:
         """What learns a problem in this form.
 
@@ -61,13 +67,34 @@ class QLearning:
 
     Attributes:
         settings: Learning rate, discount, exploration and initial values.
+        form: The name of the form.
+
+    Raises:
+        ConfigurationError: If the name is that of another form.
     """
 
     settings: QSettings = field(default_factory=QSettings)
+    form: str = field(default="q", kw_only=True)
+
+    def __post_init__(self) -> None:
+        check_form(self)
 
     def learner(self, problem: Problem, q: NDArray[np.float32] | None = None) -> QLearner:
         """What learns a problem by Q-learning; see `LearningForm`."""
         return QLearner(problem, problem.initial_q(self.settings) if q is None else q.copy(), self.settings)
+
+
+def check_form(form: LearningForm) -> None:
+    """Check that the settings of a form have its own name and not that of another.
+
+    The name is a field that can be given, so that what `dataclasses.asdict` made is read back by the class.
+
+    Raises:
+        ConfigurationError: If they have another.
+    """
+    own = next(field.default for field in fields(form) if field.name == "form")  # type: ignore[arg-type]
+    if form.form != own:
+        raise ConfigurationError(f"the form of {type(form).__name__} is {own!r}, not {form.form!r}; leave it out")
 
 
 @dataclass(slots=True, eq=False)
