@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 from tests.envs.wrappers.slow import Replay
 from tests.envs.wrappers.worlds import frozen_lake
 from tests.strategies import VARIABLES, sdnfs
+from tickwise.automata.distance import acceptance_potential
 from tickwise.automata.monitor import Monitor
 from tickwise.envs.wrappers import ExtendedState, Labelled, PotentialShaping
-from tickwise.envs.wrappers.shaping import acceptance_potential
 from tickwise.errors import ConfigurationError
 from tickwise.logic.sdnf import SDNF
 from tickwise.rl.qlearning import QSettings
@@ -188,7 +188,7 @@ def test_what_is_added_sums_up_to_the_first_potential_by_hand(truncated: bool):
 
 def test_the_potential_is_what_acceptance_is_worth_from_there():
     monitor = Monitor.of("F[0,2] (x >= 1) | G[0,1] (x <= 0)", ("x",))
-    potential = acceptance_potential(monitor, 0.5, 4.0)
+    potential = acceptance_potential(monitor.tables, 0.5, 4.0)
     first = monitor.tables[0]
     states = monitor.start([[0.0], [1.0]])
     assert potential[states[0, 0]] == 2.0  # one tick away

@@ -7,30 +7,11 @@ from typing import Any, SupportsFloat
 import gymnasium
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from tickwise.automata.distance import ticks_to_acceptance
-from tickwise.automata.monitor import Monitor
+from tickwise.automata.distance import acceptance_potential
 from tickwise.envs.wrappers.extended import TABLE_STATE, ExtendedState
 from tickwise.errors import ConfigurationError
-
-
-def acceptance_potential(monitor: Monitor, gamma: float, scale: float = 1.0) -> NDArray[np.float64]:
-    """The potential Φ(u) = scale · γ^d(u), where d(u) ticks is the soonest that table state u can accept.
-
-    It is what acceptance, worth ``scale``, would be worth to an agent that could have every letter at will, and 0
-    where no word leads to acceptance any more.
-
-    Args:
-        monitor: The formula's automata.
-        gamma: The discount factor γ.
-        scale: What acceptance is worth.
-
-    Returns:
-        The potential of each table state, one disjunct's after another's, shape ``(table states,)``.
-    """
-    ticks = np.concatenate([ticks_to_acceptance(table) for table in monitor.tables])
-    return np.where(ticks >= 0, scale * float(gamma) ** np.maximum(ticks, 0), 0.0)
 
 
 class PotentialShaping(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorArgs):
@@ -46,7 +27,8 @@ class PotentialShaping(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         env: An environment wrapped in `ExtendedState`, at any depth.
         gamma: The agent's discount factor γ, in (0, 1]; with another one the optimal policy may change.
         scale: What acceptance is worth; the size of the task's reward is a good choice.
-        potential: Φ of each table state, shape ``(table states,)``; by default `acceptance_potential`.
+        potential: Φ of each table state, shape ``(table states,)``; by default
+            `tickwise.automata.distance.acceptance_potential`; `progress_potential` there is another.
 
     Raises:
         ConfigurationError: If there is no extended state, γ is out of range, or the potential has another shape.
@@ -63,7 +45,7 @@ class PotentialShaping(gymnasium.Wrapper[Any, Any, Any, Any], RecordConstructorA
         super().__init__(env)
         if not 0 < gamma <= 1:
             raise ConfigurationError(f"gamma is {gamma}; use the agent's discount factor, above 0 and at most 1")
-        own = acceptance_potential(_extended(env).monitor, gamma, scale)
+        own = acceptance_potential(_extended(env).monitor.tables, gamma, scale)
         self._potential = own if potential is None else np.asarray(potential, dtype=np.float64)
         if self._potential.shape != own.shape or not np.isfinite(self._potential).all():
             raise ConfigurationError(
