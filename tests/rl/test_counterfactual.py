@@ -8,67 +8,32 @@ from itertools import product
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from numpy.typing import NDArray
 
-from tests.envs.twins import random_mdp
-from tests.rl.form_twins import disjunct_of, slow_counterfactual
+from tests.rl.form_twins import (
+    chance_world,
+    differences,
+    disjunct_of,
+    exact_values,
+    formula_problem,
+    slow_counterfactual,
+    steady_problem,
+)
 from tests.rl.test_kernels import q_settings, seeds
 from tests.rl.twins import extended_problems
 from tests.strategies import sequential_conjunctions
 from tickwise.automata.build import timed_automata
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.tabulate import TabularMDP
-from tickwise.envs.tasks import TaskMonitor
 from tickwise.envs.temporal import sdnf_table
 from tickwise.errors import ConfigurationError
 from tickwise.logic.parse import parse
-from tickwise.logic.sdnf import SDNF, SequentialConjunction, to_sdnf
-from tickwise.logic.syntax import Box
+from tickwise.logic.sdnf import SequentialConjunction, to_sdnf
 from tickwise.rl.counterfactual import Alternatives, Counterfactual
 from tickwise.rl.learner import LearningForm, QLearning
 from tickwise.rl.qlearning import Problem, QSettings
 from tickwise.rl.states import automaton_memory, tau_memory
 
 EPISODES = 12
-
-
-def formula_problem(mdp: TabularMDP, sdnf: SDNF, task: SDNF | None = None) -> Problem:
-    """The task is to satisfy the memory's formula, or another; all clocks run, so that they tell the tick."""
-    deadline = max(1, *(disjunct.primitives[-1].end for disjunct in sdnf.disjuncts))
-    tables = [automaton.compile(reduce=False) for automaton in timed_automata(sdnf)]
-    return Problem(mdp, sdnf_table(task or sdnf, mdp, deadline, ends="decided"), automaton_memory(mdp, tables))
-
-
-def exact_values(problem: Problem, gamma: float) -> dict[tuple[int, int], list[float]]:
-    """Q* of each memory state and state in which a step is made, by the definition, over all histories.
-
-    The world is deterministic. Where two histories lead to the same pair, the values have to be the same.
-    """
-    mdp, memory, found = problem.mdp, problem.memory, {}
-
-    def values(history: tuple[int, ...]) -> list[float]:
-        """What each action after a history is worth."""
-        u = int(memory.start[history[0]])
-        for s, action in zip(history[:-1:2], history[1::2], strict=True):
-            u = int(memory.delta[u, memory.letter[s, action, 0]])
-        worth = []
-        for action in range(mdp.n_actions):
-            monitor = TaskMonitor(problem.task)
-            monitor.start(history[0])
-            after = (*history, action, int(mdp.successor[history[-1], action, 0]))
-            for s in after[2::2]:
-                reward, over = monitor.advance(s)
-            worth.append(reward if over else reward + gamma * max(values(after)))
-        assert found.setdefault((u, history[-1]), worth) == worth
-        return worth
-
-    for s in np.flatnonzero(mdp.initial):
-        values((int(s),))
-    return found
-
-
-def differences(q: NDArray[np.float32], exact: dict[tuple[int, int], list[float]]) -> int:
-    return sum(q[u, s].tolist() != worth for (u, s), worth in exact.items())
 
 
 @settings(max_examples=60, deadline=None)
@@ -108,11 +73,7 @@ def test_alternatives_are_what_some_word_leads_to(problem: Problem):
 @given(sequential_conjunctions(most=2, longest=1), seeds)
 def test_it_finds_the_exact_values_where_the_task_is_the_formula(conjunction: SequentialConjunction, seed: int):
     rng = np.random.default_rng(seed)
-    cells = np.arange(4)[:, None] + np.array([0.5, 0.5])
-    mdp = replace(random_mdp(rng, 4, 2, 1), cell_coordinates=cells)
-    regions = [Box.of(x=(start, start + 2)) for start in rng.integers(0, 3, size=len(conjunction.primitives))]
-    primitives = (replace(one, predicate=box) for one, box in zip(conjunction.primitives, regions, strict=True))
-    problem = formula_problem(mdp, SDNF((SequentialConjunction(tuple(primitives)),)))
+    problem = steady_problem(conjunction, rng)
     exact = exact_values(problem, 0.5)
     learner = Counterfactual(QSettings(alpha=1.0, gamma=0.5, epsilon=1.0)).learner(problem)
     learner.learn(rng, 20_000)
@@ -136,19 +97,6 @@ def test_it_needs_fewer_episodes():
     exact = exact_values(problem, 0.5)
     ours, plain = (episodes_until_exact(form(chosen), problem, exact) for form in (Counterfactual, QLearning))
     assert ours < 0.6 * plain
-
-
-def chance_world() -> TabularMDP:
-    """Two cells at x = 0.5 and 1.5; whatever is done, the robot is in either at the next tick, evenly."""
-    return TabularMDP(
-        successor=np.tile([0, 1], (2, 1, 1)),
-        probability=np.full((2, 1, 2), 0.5),
-        initial=np.full(2, 0.5),
-        cell=np.arange(2),
-        cell_coordinates=np.array([[0.5], [1.5]]),
-        variables=("x",),
-        limits=((0.0, 2.0),),
-    )
 
 
 def test_outcomes_are_not_selected():
