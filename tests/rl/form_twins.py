@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from tickwise.envs.tasks import TaskMonitor
 from tickwise.envs.temporal import sdnf_table
 from tickwise.logic.sdnf import SDNF, SequentialConjunction
 from tickwise.logic.syntax import Box
+from tickwise.rl.actor_critic import FORGOTTEN, ActorCritic
 from tickwise.rl.qlearning import Problem, QSettings
 from tickwise.rl.states import Memory, automaton_memory
 
@@ -117,11 +119,11 @@ def steady_problem(conjunction: SequentialConjunction, rng: np.random.Generator)
     return formula_problem(mdp, SDNF((SequentialConjunction(tuple(primitives)),)))
 
 
-def chance_world() -> TabularMDP:
+def chance_world(actions: int = 1) -> TabularMDP:
     """Two cells at x = 0.5 and 1.5; whatever is done, the robot is in either at the next tick, evenly."""
     return TabularMDP(
-        successor=np.tile([0, 1], (2, 1, 1)),
-        probability=np.full((2, 1, 2), 0.5),
+        successor=np.tile([0, 1], (2, actions, 1)),
+        probability=np.full((2, actions, 2), 0.5),
         initial=np.full(2, 0.5),
         cell=np.arange(2),
         cell_coordinates=np.array([[0.5], [1.5]]),
@@ -156,6 +158,54 @@ def slow_shaping(
             future = 0.0 if over else settings.gamma * float(q[next_u, next_s].max())
             old = float(q[u, s, action])
             q[u, s, action] = old + settings.alpha * (reward + added + future - old)
+            u, s = next_u, next_s
+            paths[episode, monitor.tick] = s
+            total += reward
+        returns[episode] = total
+    return returns, paths
+
+
+def slow_actor_critic(
+    problem: Problem,
+    preferences: NDArray[np.float32],
+    values: NDArray[np.float32],
+    form: ActorCritic,
+    rng: np.random.Generator,
+    episodes: int,
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Actor and critic; changes preferences and values, and returns what a learner does."""
+    returns = np.zeros(episodes, dtype=np.float32)
+    paths = np.full((episodes, problem.task.horizon + 1), -1, dtype=np.int32)
+    for episode in range(episodes):
+        monitor = TaskMonitor(problem.task)
+        s = draw(cumulative(problem.mdp.initial), rng.random())
+        u = int(problem.memory.start[s])
+        monitor.start(s)
+        paths[episode, 0] = s
+        # memory state, state, what each action's preference has of a surprise, and the trace, of each step
+        steps: list[tuple[int, int, list[float], float]] = []
+        total, over = 0.0, False
+        while not over:
+            row = [float(preference) for preference in preferences[u, s]]
+            weights = [math.exp((preference - max(row)) / form.temperature) for preference in row]
+            whole = np.cumsum(weights)[-1]  # one by one; newer Pythons' sum is more exact
+            chances = [weight / whole for weight in weights]
+            action, left = 0, rng.random() * whole - weights[0]
+            while left >= 0 and action < len(row) - 1:
+                action += 1
+                left -= weights[action]
+            next_u, next_s = advance(problem, u, s, action, rng.random())
+            reward, over = monitor.advance(next_s)
+            surprise = reward - float(values[u, s]) + (0.0 if over else form.gamma * float(values[next_u, next_s]))
+            shares = [(1.0 if a == action else 0.0) - chance for a, chance in enumerate(chances)]
+            steps = [step for step in steps if step[:2] != (u, s)] + [(u, s, shares, 1.0)]
+            for past_u, past_s, past_shares, trace in steps:
+                values[past_u, past_s] = float(values[past_u, past_s]) + form.critic * (surprise * trace)
+                for a, share in enumerate(past_shares):
+                    old = float(preferences[past_u, past_s, a])
+                    preferences[past_u, past_s, a] = old + form.actor * (surprise * trace) * share
+            faded = [(*rest, trace * (form.gamma * form.trace)) for *rest, trace in steps]
+            steps = [step for step in faded if step[3] >= FORGOTTEN]
             u, s = next_u, next_s
             paths[episode, monitor.tick] = s
             total += reward

@@ -36,6 +36,12 @@ def test_given_values_are_copied() -> None:
     assert (learner.q != 3.0).any()
 
 
+def test_given_values_of_another_shape_are_refused() -> None:
+    problem = a_problem()
+    with pytest.raises(ConfigurationError, match=r"the values to begin with have shape \(3, 3\); give \(memory states"):
+        QLearning().learner(problem, np.zeros((3, 3), dtype=np.float32))
+
+
 def test_settings_under_the_name_of_another_form_are_refused() -> None:
     with pytest.raises(ConfigurationError, match="the form of QLearning is 'q', not 'model'; leave it out"):
         QLearning(form="model")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tickwise._jit import njit
 from tickwise.errors import ConfigurationError
-from tickwise.rl.learner import check_form
+from tickwise.rl.learner import check_form, first_values
 from tickwise.rl.loop import advance, begin, best_value, draw_action, run_episodes
 from tickwise.rl.qlearning import Problem, QSettings
 from tickwise.rl.states import Memory
@@ -66,9 +66,10 @@ class Counterfactual:
         """What learns a problem with counterfactual updates; see `tickwise.rl.learner.LearningForm`.
 
         Raises:
-            ConfigurationError: If the memory is not one of automata, so that nothing has a verdict.
+            ConfigurationError: If the memory is not one of automata, so that nothing has a verdict, or the values have
+                another shape.
         """
-        q = problem.initial_q(self.settings) if q is None else q.copy()
+        q = first_values(problem, self.settings.initial, q)
         return CounterfactualLearner(problem, q, self.settings, Alternatives.of(problem))
 
 

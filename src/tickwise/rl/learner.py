@@ -57,6 +57,9 @@ class LearningForm(Protocol):
             problem: What to learn.
             q: Values to begin with, such as transferred ones, shape ``(memory states, states, actions)``; they are
                 copied. None for those of the settings.
+
+        Raises:
+            ConfigurationError: If the form cannot learn the problem, or the values have another shape.
         """
         ...
 
@@ -81,7 +84,23 @@ class QLearning:
 
     def learner(self, problem: Problem, q: NDArray[np.float32] | None = None) -> QLearner:
         """What learns a problem by Q-learning; see `LearningForm`."""
-        return QLearner(problem, problem.initial_q(self.settings) if q is None else q.copy(), self.settings)
+        return QLearner(problem, first_values(problem, self.settings.initial, q), self.settings)
+
+
+def first_values(problem: Problem, initial: float, q: NDArray[np.float32] | None) -> NDArray[np.float32]:
+    """A table of its own to begin with: a copy of given values, or one value throughout.
+
+    Raises:
+        ConfigurationError: If the given values have another shape than the problem.
+    """
+    shape = (problem.memory.n_states, problem.mdp.n_states, problem.mdp.n_actions)
+    if q is None:
+        return np.full(shape, initial, dtype=np.float32)
+    if q.shape != shape:
+        raise ConfigurationError(
+            f"the values to begin with have shape {q.shape}; give (memory states, states, actions), here {shape}"
+        )
+    return np.array(q, dtype=np.float32, order="C")
 
 
 def check_form(form: LearningForm) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tickwise.automata.distance import acceptance_potential, progress_potential
 from tickwise.automata.ticks import TickTable
 from tickwise.errors import ConfigurationError
-from tickwise.rl.learner import QLearner, check_form
+from tickwise.rl.learner import QLearner, check_form, first_values
 from tickwise.rl.qlearning import Problem, QSettings
 
 Potential = Callable[[Sequence[TickTable], float], NDArray[np.float64]]
@@ -91,7 +91,7 @@ class Shaping:
         """What learns a problem with shaping; see `tickwise.rl.learner.LearningForm`.
 
         Raises:
-            ConfigurationError: If the memory is not one of automata.
+            ConfigurationError: If the memory is not one of automata, or the values have another shape.
         """
-        start = problem.initial_q(self.settings) if q is None else q
+        start = first_values(problem, self.settings.initial, q)
         return QLearner(problem, start + self.phi(problem)[:, None, None], self.settings)
