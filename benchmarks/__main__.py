@@ -11,7 +11,7 @@ from pathlib import Path
 from benchmarks.report import table, write
 from benchmarks.result import Result
 
-BENCHMARKS = ("learning", "planning", "counting", "monitoring", "exact_search", "parts", "runs", "start")
+BENCHMARKS = ("learning", "forms", "planning", "counting", "monitoring", "exact_search", "parts", "runs", "start")
 """Modules with ``measure(quick: bool) -> list[Result]``, in the order of the table."""
 
 

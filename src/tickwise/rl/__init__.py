@@ -1,1 +1,1 @@
-"""Learning over tables: Q-learning on τ-states and on extended states."""
+"""Learning over tables: Q-learning, and other forms of learning, on τ-states and on extended states."""
