@@ -65,13 +65,14 @@ def test_learning_in_two_parts_is_learning_at_once(name: str):
     np.testing.assert_array_equal(np.concatenate([part[1] for part in parts]), paths)
     assert twice.q.tobytes() == once.q.tobytes()
     assert rngs[0].bit_generator.state == rngs[1].bit_generator.state
-    assert twice.problem is problem
+    assert twice.problem.mdp is problem.mdp and twice.problem.task is problem.task
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_values_to_begin_with_are_left_as_they_are_and_must_fit(name: str):
     problem, form = a_problem(), find_form(name)()
-    q = np.full(form.learner(problem).q.shape, 3.0, dtype=np.float32)
+    shape = (problem.memory.n_states, problem.mdp.n_states, problem.mdp.n_actions)
+    q = np.full(shape, 3.0, dtype=np.float32)
     form.learner(problem, q).learn(np.random.default_rng(0), 5)
     assert (q == 3.0).all()
     with pytest.raises(ConfigurationError, match="the values to begin with have shape"):

@@ -6,6 +6,7 @@ from tickwise.errors import ConfigurationError
 from tickwise.rl.actor_critic import ActorCritic
 from tickwise.rl.counterfactual import Counterfactual
 from tickwise.rl.learner import LearningForm, QLearning
+from tickwise.rl.model import ModelBased
 from tickwise.rl.shaping import Shaping
 
 FORMS: dict[str, type[LearningForm]] = {
@@ -13,6 +14,7 @@ FORMS: dict[str, type[LearningForm]] = {
     "counterfactual": Counterfactual,
     "shaping": Shaping,
     "actor_critic": ActorCritic,
+    "model": ModelBased,
 }
 """The forms by name; the first is the paper's, and another may be added here.
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.errors import ConfigurationError
+from tickwise.rl.learner import check_form, first_values
 from tickwise.rl.planning import CLASSES, Counts, imagine, plan, play
 from tickwise.rl.qlearning import Problem
 from tickwise.rl.stream import put_back, take_stream
@@ -44,7 +45,7 @@ class ModelBased:
             reward.
         pooling: The weight, in arrivals, of the mean reward of all states where the automaton says the same in the
             estimate for one of them.
-        form: Which form of learning it is.
+        form: The name of the form.
 
     Raises:
         ConfigurationError: If a setting is out of range.
@@ -53,9 +54,10 @@ class ModelBased:
     known: int = 1
     hope: float = 50.0
     pooling: float = 0.01
-    form: str = field(default="model", init=False)
+    form: str = field(default="model", kw_only=True)
 
     def __post_init__(self) -> None:
+        check_form(self)
         if self.known < 1:
             raise ConfigurationError(f"known is {self.known}; a pair is known once it was met 1 time or more often")
         if not (np.isfinite(self.hope) and 0 < self.pooling < np.inf):
@@ -76,7 +78,7 @@ class ModelBased:
         """
         unrolled = unroll(problem.memory, problem.task.horizon)
         counts = no_counts(problem.mdp) if counts is None else counts
-        given = np.empty((0, 1, 1), np.float32) if q is None else q[unrolled.state]
+        given = np.empty((0, 1, 1), np.float32) if q is None else first_values(problem, 0.0, q)[unrolled.state]
         return ModelLearner(Problem(problem.mdp, problem.task, unrolled.memory), unrolled, counts, self, given)
 
 
