@@ -65,7 +65,8 @@ def test_learning_in_two_parts_is_learning_at_once(name: str):
     np.testing.assert_array_equal(np.concatenate([part[1] for part in parts]), paths)
     assert twice.q.tobytes() == once.q.tobytes()
     assert rngs[0].bit_generator.state == rngs[1].bit_generator.state
-    assert twice.problem.mdp is problem.mdp and twice.problem.task is problem.task
+    assert twice.problem.mdp is problem.mdp
+    assert twice.problem.task is problem.task
 
 
 @pytest.mark.parametrize("name", NAMES)
