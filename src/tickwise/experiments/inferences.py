@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from tickwise._seeding import generator
+from tickwise.envs.catalog import EnvironmentSpec
 from tickwise.envs.gridworld import GridWorld
 from tickwise.experiments.artefacts import Artefacts
 from tickwise.experiments.job import Job, Outcome, Report, formulas_job
@@ -59,10 +60,19 @@ def labelled_data(
 def inference_task(spec: StudySpec, store: Artefacts, task: str, run: int, protocol: str = "paper") -> Task:
     """What inference needs: the data, the uniform prior over the MDP's paths, and whole cells as regions."""
     environment = environment_of(spec, task)
+    data = labelled_data(spec, store, task, run, protocol)
+    return Task(data, uniform_prior(environment), search_space(environment))
+
+
+def uniform_prior(environment: EnvironmentSpec) -> PathPrior:
+    """The uniform prior over the paths of a world's MDP until the deadline."""
     mdp, horizon = environment.mdp(), environment.task.deadline
-    prior = PathPrior(mdp.support_graph(), mdp.coordinates, variables=mdp.variables, horizon=horizon)
-    space = SearchSpace.grid(environment.world.size, horizon, mdp.variables)
-    return Task(labelled_data(spec, store, task, run, protocol), prior, space)
+    return PathPrior(mdp.support_graph(), mdp.coordinates, variables=mdp.variables, horizon=horizon)
+
+
+def search_space(environment: EnvironmentSpec) -> SearchSpace:
+    """Whole cells of a world as regions, and windows until the deadline."""
+    return SearchSpace.grid(environment.world.size, environment.task.deadline, environment.mdp().variables)
 
 
 def settings_of(spec: StudySpec, protocol: str, data: LabelledTrajectories) -> InferenceSettings:

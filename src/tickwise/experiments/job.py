@@ -21,7 +21,7 @@ class Job:
     Attributes:
         kind: ``collect``, ``infer`` or ``learn``.
         subject: The task ``source`` or ``target`` of a collection; the protocol of an inference, where it is not the
-            paper's; or what learns: ``source``, ``I`` … ``IV``.
+            paper's; or what learns: ``source``, ``I`` … ``V``.
         run: The number of the run, from 0.
     """
 

@@ -15,6 +15,7 @@ from tickwise._seeding import generator, seed_sequence
 from tickwise.envs.planning import optimal_value
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.experiments.artefacts import Artefact, Artefacts
+from tickwise.experiments.closing import learn_in_closed_loop
 from tickwise.experiments.inferences import infer, study_formulas
 from tickwise.experiments.job import Job, Outcome, Report
 from tickwise.experiments.measures import block_means, goal_reached
@@ -22,7 +23,8 @@ from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.recording import Recorder, recording_points
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import Collection, StudySpec, environment_of
-from tickwise.rl.qlearning import Problem, collect, evaluate, learn
+from tickwise.rl.learner import QLearning
+from tickwise.rl.qlearning import Problem, collect, evaluate
 from tickwise.rl.states import automaton_memory, disjunct_choice, tau_memory
 from tickwise.transfer.hypothesis import tick_tables
 from tickwise.transfer.qtransfer import transfer_q
@@ -155,26 +157,28 @@ def evaluation_points(spec: StudySpec, episodes: int) -> list[int]:
 def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outcome:
     """Q-learning (Step 3) of the source task or of one of Methods I to IV, evaluated, and recorded, on fixed seeds."""
     learning, subject = spec.learning, job.subject
-    settings = learning.source if subject == "source" else learning.settings
-    problem = learning_problem(spec, store, subject)
-    q = problem.initial_q(settings)
+    if subject == "V":
+        return learn_in_closed_loop(job, spec, store, report)
+    form = QLearning(learning.source) if subject == "source" else learning.form(subject)
+    problem, q = learning_problem(spec, store, subject), None
     if subject == "IV":
         source = learning_problem(spec, store, "source")
         learned = store.load(Job("learn", "source", job.run).name)["q"]
-        q = transfer_q(source.mdp, source.memory, learned, problem.mdp, problem.memory, settings.initial)
+        q = transfer_q(source.mdp, source.memory, learned, problem.mdp, problem.memory, learning.settings.initial)
+    learner = form.learner(problem, q)
     rng = generator(spec.seed, spec.name, "learn", subject, job.run)
     fixed = seed_sequence(spec.seed, spec.name, "evaluate")
     episodes = learning.source_episodes if subject == "source" else learning.most_episodes[subject]
     points = evaluation_points(spec, episodes)
-    recorder = Recorder(problem, fixed, recording_points(points))
-    values = [evaluate(problem, q, fixed, learning.evaluation_episodes)]
-    recorder.look(0, q)
+    recorder = Recorder(learner.problem, fixed, recording_points(points))
+    values = [evaluate(learner.problem, learner.q, fixed, learning.evaluation_episodes)]
+    recorder.look(0, learner.q)
     parts = []
     for before, now in pairwise(points):
         report(before, episodes)
-        parts.append(learn(problem, q, settings, rng, now - before))
-        values.append(evaluate(problem, q, fixed, learning.evaluation_episodes))
-        recorder.look(now, q)
+        parts.append(learner.learn(rng, now - before)[0])
+        values.append(evaluate(learner.problem, learner.q, fixed, learning.evaluation_episodes))
+        recorder.look(now, learner.q)
     returns = np.concatenate(parts)
     arrays: dict[str, NDArray[Any]] = {
         "blocks": block_means(returns, learning.block),
@@ -183,7 +187,7 @@ def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outco
         **recorder.arrays(),
     }
     if subject == "source":
-        arrays["q"] = q
+        arrays["q"] = learner.q
     goal = goal_reached(returns, learning.goal, optimal_value(problem.mdp, problem.task))
     return Outcome({"run": job.run, "episodes": episodes, "goal": goal}, arrays)
 

@@ -104,7 +104,7 @@ def random_pair(number: int, seed: int = 0, *, runs: int = 5, protocol: str = "p
             settings=QSettings(initial=40.0),
             source=QSettings(initial=40.0),
             source_episodes=200_000,
-            most_episodes=dict.fromkeys(("I", "III", "IV"), 200_000),
+            most_episodes={**dict.fromkeys(("I", "III", "IV"), 200_000), "V": 1_000},
             window=20_000,
             evaluation_steps=((10_000, 250), (50_000, 2_500), (0, 10_000)),
         ),

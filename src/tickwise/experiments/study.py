@@ -10,10 +10,13 @@ from tickwise.errors import ConfigurationError
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.tree import InferenceSettings
+from tickwise.rl.learner import LearningForm, QLearning
 from tickwise.rl.qlearning import QSettings
+from tickwise.transfer.closed_loop import LoopSettings
 
-METHODS = ("I", "II", "III", "IV")
-"""The methods of Section V: τ-states; the formula without information gain; the formula; with transferred values."""
+METHODS = ("I", "II", "III", "IV", "V")
+"""The methods of Section V: τ-states; the formula without information gain; the formula; with transferred values. The
+fifth is ours: the closed loop of `tickwise.transfer.closed_loop`, in its form of learning."""
 
 PROTOCOLS = {
     "paper": "some random negatives, a particle swarm, primitives one by one",
@@ -96,6 +99,9 @@ class Learning:
         most_episodes: Method to the most episodes it learns for.
         disjunct: The name of the strategy that chooses the disjunct at the start of an episode (see
             `tickwise.rl.states.DISJUNCT_CHOICES`).
+        forms: Method to the form that it learns in, where it is not Q-learning with `settings`.
+        loop: How Method V goes about collecting, inferring and learning at once.
+        loop_steps: Method V has an evaluation at each multiple of so many episodes.
         goal: The measure of convergence nearest to the paper's.
         window: Episodes of the paper's box plot: the mean return over them is compared.
         block: Episodes of the paper's averaging.
@@ -108,14 +114,21 @@ class Learning:
     source: QSettings = field(default_factory=lambda: QSettings(initial=40.0))
     source_episodes: int = 1_000_000
     most_episodes: dict[str, int] = field(
-        default_factory=lambda: {"I": 2_000_000, "II": 2_000_000, "III": 100_000, "IV": 100_000}
+        default_factory=lambda: {"I": 2_000_000, "II": 2_000_000, "III": 100_000, "IV": 100_000, "V": 2_000}
     )
     disjunct: str = "nearest_centroid"
+    forms: dict[str, LearningForm] = field(default_factory=dict)
+    loop: LoopSettings = field(default_factory=LoopSettings)
+    loop_steps: int = 20
     goal: Goal = field(default_factory=Goal)
     window: int = 40_000
     block: int = 10
     evaluation_episodes: int = 200
     evaluation_steps: tuple[tuple[int, int], ...] = ((10_000, 100), (50_000, 500), (0, 5_000))
+
+    def form(self, method: str) -> LearningForm:
+        """The form that a method learns in."""
+        return self.forms.get(method, QLearning(self.settings))
 
     @property
     def shown(self) -> int:
@@ -209,7 +222,7 @@ class StudySpec:
 
     def quick(self) -> StudySpec:
         """The same study with fewer runs and episodes, to look at within minutes."""
-        limits = {"I": 100_000, "II": 100_000, "III": 50_000, "IV": 50_000}
+        limits = {"I": 100_000, "II": 100_000, "III": 50_000, "IV": 50_000, "V": 1_500}
         most = {method: min(most, limits[method]) for method, most in self.learning.most_episodes.items()}
         return replace(self, runs=3, full=1, short=True, learning=replace(self.learning, most_episodes=most))
 

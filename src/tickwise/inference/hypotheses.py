@@ -39,7 +39,7 @@ class Hypotheses:
         source: The formula whose structure is taken, φ^S; windows, durations and the sizes of regions begin near its.
         space: What boxes and times may be chosen.
         prior: The prior of the information gain.
-        count: How many are kept.
+        count: How many are kept while nothing was good; then a tenth, since good trajectories tell much more.
         rng: The source of all randomness.
         copies: How many copies of the structure are joined by ∨ (Definition 7).
         positions: Their positions in the space, shape ``(n, dimensions)``.
@@ -87,6 +87,7 @@ class Hypotheses:
             self._select(np.concatenate(parts), data, weights)
             return
         parts.append(sampled_starts(data, self.space, self.shape, self.count // 2, self.rng))
+        self.positions = self.positions[: self._kept(data)]
         for _ in range(rounds):
             parts += [self._varied(self.positions), self._varied(self._crossed(self.positions))]
             self._select(np.concatenate(parts), data, weights)
@@ -128,8 +129,11 @@ class Hypotheses:
         objective = Objective(data, weights, self.prior, self.space, self.shape, self._gaps, 0.0)
         candidates = np.unique(np.rint(candidates) if not any(self.space.continuous) else candidates, axis=0)
         errors = np.round(1 - objective(candidates, np.full(len(candidates), -np.inf)), 9)
-        order = np.lexsort((self.rng.random(len(errors)), errors))[: self.count]
+        order = np.lexsort((self.rng.random(len(errors)), errors))[: self._kept(data)]
         self.positions, self.errors = candidates[order], errors[order]
+
+    def _kept(self, data: LabelledTrajectories) -> int:
+        return max(self.count // 10, 1) if data.positives else self.count
 
     def _varied(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Each with a number or two changed by one or two steps."""
