@@ -8,7 +8,9 @@ from typing import Any
 from markupsafe import Markup
 
 from tickwise.envs.catalog import EnvironmentSpec
+from tickwise.experiments.budget_rows import budget_rows, loop_rows
 from tickwise.experiments.captions import captions
+from tickwise.experiments.cells import episodes_cell
 from tickwise.experiments.choices import capital, choices, signed
 from tickwise.experiments.curves import curve_data
 from tickwise.experiments.page import Part, inline_svg, json_island, render_page, template
@@ -40,6 +42,7 @@ _METHODS = {
     "II": "extended states of φ′ᵀ (λ = 0)",
     "III": "extended states of φᵀ",
     "IV": "extended states of φᵀ, starting with the transferred Q̄",
+    "V": "the closed loop: collecting, inferring and learning at once",
 }
 
 
@@ -82,6 +85,8 @@ def study_part(
         convergence=[_method_row(name, summary, spec, "reached") for name in _METHODS],
         staying=[_method_row(name, summary, spec, "stays") for name in _METHODS],
         ratios=_ratio_rows(summary, spec),
+        budget=budget_rows(summary, spec, _METHODS),
+        loops=loop_rows(summary, spec),
         goal=spec.learning.goal.text,
         heading=capital(spec.learning.goal.heading),
         reason=_sentence(summary["reason"]),
@@ -203,7 +208,7 @@ def _method_row(name: str, summary: Mapping[str, Any], spec: StudySpec, kind: st
     columns = ["goal"] if kind == "reached" else []
     columns += [f"{kind}_{level}" for level in LEVELS]
     columns += ["settled"] if kind == "reached" else []
-    row["cells"] = [_cell(method["statistics"][column], len(method["episodes"]), limit) for column in columns]
+    row["cells"] = [episodes_cell(method["statistics"][column], len(method["episodes"]), limit) for column in columns]
     row["means"] = [
         {
             "text": signed(found["iqm"], ".1f"),
@@ -212,20 +217,6 @@ def _method_row(name: str, summary: Mapping[str, Any], spec: StudySpec, kind: st
         for found in (method["statistics"][key] for key in ("window_mean", "end_mean"))
     ]
     return row
-
-
-def _cell(statistics: Mapping[str, Any], runs: int, limit: int) -> dict[str, str]:
-    """Episodes to convergence over the runs, as text and as a note."""
-    reached = statistics["reached"]
-    there = f"{reached} of {runs} runs"
-    if statistics["mean"] is not None and reached == runs:
-        return {
-            "text": count(statistics["mean"]),
-            "note": f"{count(statistics['low'])} to {count(statistics['high'])}; {there}",
-        }
-    if statistics["median"] is not None:
-        return {"text": f"median {count(statistics['median'])}", "note": f"{there} within {count(limit)}"}
-    return {"text": "–" if reached else "none", "note": f"{there} within {count(limit)}"}
 
 
 def _ratio_rows(summary: Mapping[str, Any], spec: StudySpec) -> list[dict[str, Any]]:

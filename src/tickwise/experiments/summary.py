@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tickwise.envs.planning import optimal_value, worst_value
+from tickwise.experiments.budget import budget_statistics, target_episodes
 from tickwise.experiments.inferences import labelled_data, study_formulas
 from tickwise.experiments.job import Job, inference_job
 from tickwise.experiments.measures import (
@@ -24,6 +25,9 @@ from tickwise.experiments.store import Store
 from tickwise.experiments.study import StudySpec, environment_of
 from tickwise.logic.parse import parse
 from tickwise.logic.structure import structure
+
+LOOP = ("run", "collected", "first_good", "formula", "transferable", "reason", "attempts")
+"""What a run of the closed loop gave beside its curves."""
 
 PAIRS = (("I", "III"), ("III", "IV"))
 """Methods whose episodes to convergence are compared: the paper's one order of magnitude, and the next."""
@@ -69,7 +73,7 @@ def gather(spec: StudySpec, store: Store, version: str) -> dict[str, Any]:
         "transferable": inferences[0]["target"]["transferable"], "reason": inferences[0]["target"]["reason"],
         "structures": _structures(spec, inferences), "goal": spec.learning.goal.text,
         "v_star": values["target"][0], "fail": values["target"][1], "source_v_star": values["source"][0],
-        "methods": {name: _method_summary(spec, results) for name, results in methods.items()},
+        "methods": {name: _method_summary(spec, name, results, collections) for name, results in methods.items()},
         "ratios": _ratios(spec, methods), "collections": collections,
         "protocols": gather_protocols(spec, store, collections),
     }  # fmt: skip
@@ -124,16 +128,22 @@ def _measures(results: list[dict[str, Any]]) -> dict[str, list[int | None]]:
     return measures
 
 
-def _method_summary(spec: StudySpec, results: list[dict[str, Any]]) -> dict[str, Any]:
+def _method_summary(
+    spec: StudySpec, name: str, results: list[dict[str, Any]], collections: list[dict[str, Any]]
+) -> dict[str, Any]:
+    spent = target_episodes(name, results, collections[0]["target"]["episodes"])
     measures = _measures(results)
     means = {name: [result[name] for result in results] for name in ("window_mean", "end_mean")}
     statistics: dict[str, Any] = {name: episode_statistics(values, spec.seed) for name, values in measures.items()}
     statistics |= {name: return_statistics(values, spec.seed) for name, values in means.items()}
+    closed = {"loops": [{key: result[key] for key in LOOP} for result in results]} if name == "V" else {}
     return {
         **measures,
         **means,
+        **closed,
         "episodes": [result["episodes"] for result in results],
-        "statistics": statistics,
+        "target_episodes": spent,
+        "statistics": statistics | {"target_episodes": budget_statistics(spent, spec.seed)},
     }
 
 

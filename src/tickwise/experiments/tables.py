@@ -76,12 +76,13 @@ def study_tables(summary: Mapping[str, Any], folder: Path) -> Iterator[str | Tab
     )
     columns = {"goal": "goal", "reached_80": "80 %", "reached_90": "90 %", "reached_95": "95 %", "settled": "settled"}
     table.add_column("method")
-    for heading in (*columns.values(), "mean return"):
+    for heading in (*columns.values(), "mean return", "in all"):
         table.add_column(heading, justify="right")
     for name, method in summary["methods"].items():
         statistics = method["statistics"]
         cells = [_episodes(statistics[key], runs) for key in columns]
-        table.add_row(name, *cells, f"{statistics['window_mean']['iqm']:.1f}")
+        spent = _episodes(statistics["target_episodes"]["total"], runs)
+        table.add_row(name, *cells, f"{statistics['window_mean']['iqm']:.1f}", spent)
     yield table
     for pair, measures in summary["ratios"].items():
         found = measures["goal"]

@@ -5,6 +5,7 @@ const LOOKS = {
   II: { dash: "8 3", meaning: "φ′ᵀ, no information gain" },
   III: { dash: "10 3 2 3", meaning: "φᵀ" },
   IV: { dash: null, meaning: "φᵀ, transferred Q̄" },
+  V: { dash: "5 2", meaning: "closed loop" },
 };
 
 const LEAST_POINTS = 40; // with fewer of them in view, the curve of more points is shown

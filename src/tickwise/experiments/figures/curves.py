@@ -95,4 +95,10 @@ def _legend(figure: Figure, names: Sequence[str]) -> None:
         for name, look in METHODS.items()
         if name in names
     ]
-    figure.legend(handles=handles, loc="lower center", ncols=4, columnspacing=1.6, handlelength=3.2)
+    figure.legend(
+        handles=handles,
+        loc="lower center",
+        ncols=min(len(handles), 3) if len(handles) > 4 else 4,
+        columnspacing=1.6,
+        handlelength=3.2,
+    )

@@ -76,8 +76,10 @@ METHODS: Final = {
     "II": Look(PURPLE, (0, (5, 1.6)), "s", r"$\varphi'^{\mathrm{T}}$, no information gain"),
     "III": Look(BLUE, (0, (6, 1.4, 1.4, 1.4)), "^", r"$\varphi^{\mathrm{T}}$"),
     "IV": Look(VERMILION, "-", "D", r"$\varphi^{\mathrm{T}}$, transferred $\bar{Q}$"),
+    "V": Look(GREEN, (0, (3, 1)), "P", "closed loop"),
 }
-"""The paper's black, magenta, blue and red, as colours that colour-blind readers can tell apart."""
+"""The paper's black, magenta, blue and red, as colours that colour-blind readers can tell apart, and green for the
+closed loop."""
 
 
 def canvas(height: float, width: float = WIDTH) -> Figure:
