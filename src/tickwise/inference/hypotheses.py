@@ -81,12 +81,12 @@ class Hypotheses:
             weights: What an error in each costs, shape ``(n,)``.
             rounds: How often to vary and select.
         """
-        parts = [self.positions, self._drawn(2 * self.count)]
+        parts = [self.positions, self._drawn(2 * self._kept(data))]
         if not data.positives:
             # variations of what was not contradicted would drift to what is never put to the test
             self._select(np.concatenate(parts), data, weights)
             return
-        parts.append(sampled_starts(data, self.space, self.shape, self.count // 2, self.rng))
+        parts.append(sampled_starts(data, self.space, self.shape, self._kept(data), self.rng))
         self.positions = self.positions[: self._kept(data)]
         for _ in range(rounds):
             parts += [self._varied(self.positions), self._varied(self._crossed(self.positions))]
@@ -98,15 +98,16 @@ class Hypotheses:
         width = self.positions.shape[1] // self.copies
         single = [self.positions[:, i * width : (i + 1) * width] for i in range(self.copies)]
         alone = structure_shape(self.source)
-        pool = np.concatenate([*single, sampled_starts(data, self.space, alone, 4 * self.count, self.rng)])
+        pool = np.concatenate([*single, sampled_starts(data, self.space, alone, 4 * self._kept(data), self.rng)])
         accepted = Objective(data, weights * (data.labels < 0), self.prior, self.space, alone, self._gaps, 0.0)
         covered = Objective(data, weights * (data.labels > 0), self.prior, self.space, alone, self._gaps, 0.0)
         lowest = np.full(len(pool), -np.inf)
         order = np.lexsort((-covered(pool, lowest), np.round(-accepted(pool, lowest), 2)))
         pure = pool[order[:_PURE]]
         self.copies += 1
-        picked = self.rng.integers(len(pure), size=(4 * self.count, self.copies))
-        self._select(pure[picked].reshape(4 * self.count, -1), data, weights)
+        count = 4 * self._kept(data)
+        picked = self.rng.integers(len(pure), size=(count, self.copies))
+        self._select(pure[picked].reshape(count, -1), data, weights)
 
     def mass(self, trajectories: LabelledTrajectories, among: NDArray[np.float64]) -> float:
         """The mean share of some formulas that trajectories satisfy: the probability that they are good.
