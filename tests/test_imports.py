@@ -17,12 +17,13 @@ ROOT = Path(tickwise.__file__).parent
 
 # A module may import its own layer and those of lower rank. Layers of equal rank do not know each other.
 RANKS = {
-    "errors": 0, "_jit": 0, "_seeding": 0, "_wording": 0, "_files": 0.5,
+    "errors": 0, "_jit": 0, "_seeding": 0, "_wording": 0, "_files": 0.5, "_archives": 0.5,
     "logic": 1,
     "automata": 2,
     "envs": 3,
     "inference": 4, "rl": 4,
     "transfer": 5,
+    "library": 5.5,
     "experiments": 6,
     "cli": 7,
     "__main__": 8, "__init__": 8,

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from tickwise._archives import npz_bytes
 from tickwise._files import write_bytes
 from tickwise.errors import MissingFileError, StoreError
-from tickwise.experiments import artefacts
 from tickwise.experiments.store import Store, read_json, write_json
 
 ARRAYS = {"b": np.arange(6, dtype=np.int32).reshape(2, 3), "a": np.array([0.5, np.nan])}
@@ -59,8 +59,8 @@ def test_an_artefact_without_arrays_is_one_file(store: Store):
     )
 )
 def test_any_array_comes_back_from_the_same_bytes(array: np.ndarray):
-    content = artefacts._npz({"array": array, "other": ARRAYS["b"]})
-    assert content == artefacts._npz({"other": ARRAYS["b"], "array": array})
+    content = npz_bytes({"array": array, "other": ARRAYS["b"]})
+    assert content == npz_bytes({"other": ARRAYS["b"], "array": array})
     with np.load(io.BytesIO(content), allow_pickle=False) as found:
         np.testing.assert_array_equal(found["array"], array)
         assert found["array"].dtype == array.dtype
@@ -203,7 +203,7 @@ def test_broken_arrays_are_named(store: Store):
 
 def test_arrays_that_lack_a_named_one_are_broken(store: Store):
     store.save("one", {}, ARRAYS)
-    write_bytes(store.folder / "artefacts" / "one.npz", artefacts._npz({"a": ARRAYS["a"]}))
+    write_bytes(store.folder / "artefacts" / "one.npz", npz_bytes({"a": ARRAYS["a"]}))
     with pytest.raises(StoreError, match="is broken"):
         store.load("one")
     np.save(store.folder / "artefacts" / "one", ARRAYS["a"])

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-import io
 import json
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._archives import json_bytes, npz_arrays, npz_bytes
 from tickwise.errors import StoreError
-
-_EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 class Artefacts(Protocol):
@@ -46,7 +41,7 @@ class Artefact:
     @classmethod
     def pack(cls, name: str, manifest: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Artefact:
         """An artefact of plain data and arrays."""
-        return cls(name, json_bytes({**manifest, "arrays": sorted(arrays)}), _npz(arrays) if arrays else None)
+        return cls(name, json_bytes({**manifest, "arrays": sorted(arrays)}), npz_bytes(arrays) if arrays else None)
 
     def content(self) -> dict[str, Any]:
         """Manifest and arrays, as one mapping.
@@ -57,7 +52,10 @@ class Artefact:
         path = self.folder / f"{self.name}.json"
         manifest = parse_json(self.manifest, path)
         names = named_arrays(manifest, path)
-        arrays = {} if self.arrays is None else _load_npz(self.arrays, names, path.with_suffix(".npz"))
+        try:
+            arrays = {} if self.arrays is None else npz_arrays(self.arrays, names)
+        except ValueError as error:
+            raise broken(path.with_suffix(".npz"), error) from error
         return {key: value for key, value in manifest.items() if key != "arrays"} | arrays
 
 
@@ -70,11 +68,6 @@ class Parcel:
     def load(self, name: str) -> dict[str, Any]:
         """An artefact's manifest and arrays, as one mapping."""
         return self.artefacts[name].content()
-
-
-def json_bytes(content: Any) -> bytes:
-    """Plain data as the JSON of a file."""
-    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def parse_json(content: bytes, path: Path) -> Any:
@@ -103,24 +96,3 @@ def named_arrays(manifest: Any, path: Path) -> list[str]:
 def broken(path: Path, reason: object) -> StoreError:
     """The error for a file whose content cannot be read."""
     return StoreError(f"{path} is broken ({reason}); remove it and run the same study again")
-
-
-def _npz(arrays: Mapping[str, NDArray[Any]]) -> bytes:
-    """An npz file whose bytes depend on the arrays alone: NumPy's own carries the time of writing."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED, compresslevel=3) as archive:
-        for name, array in sorted(arrays.items()):
-            entry = io.BytesIO()
-            np.lib.format.write_array(entry, np.asanyarray(array), allow_pickle=False)
-            info = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
-            info.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(info, entry.getvalue())
-    return buffer.getvalue()
-
-
-def _load_npz(content: bytes, names: list[str], path: Path) -> dict[str, NDArray[Any]]:
-    try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in names}
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error) as error:
-        raise broken(path, error) from error

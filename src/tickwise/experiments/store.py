@@ -10,9 +10,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from tickwise._archives import json_bytes
 from tickwise._files import TEMPORARY, write_bytes
 from tickwise.errors import MissingFileError, StoreError
-from tickwise.experiments.artefacts import Artefact, json_bytes, named_arrays, parse_json
+from tickwise.experiments.artefacts import Artefact, named_arrays, parse_json
 
 FORMAT = 2
 """Changes whenever old artefacts can no longer be read or would be computed in another way."""
