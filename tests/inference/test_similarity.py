@@ -6,7 +6,7 @@ from tests.strategies import sdnfs
 from tickwise.errors import FormulaError, UnknownVariableError
 from tickwise.inference.information import probability
 from tickwise.inference.prior import BoxPrior
-from tickwise.inference.similarity import disagreement, dissimilarity
+from tickwise.inference.similarity import aligned_dissimilarity, disagreement, dissimilarity
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF
 
@@ -54,6 +54,15 @@ def test_independent_draws_by_hand():
     assert dissimilarity(parse("G[0,1] (x >= 3)"), parse("G[0,1] (x <= 2)"), prior) == 1
     # neither can be: the prior ends at 4
     assert dissimilarity(parse("F[0,1] (x >= 5)"), parse("F[0,1] (x >= 6)"), prior) == 0
+
+
+def test_what_remains_after_alignment_by_hand():
+    prior = BoxPrior({"x": (0.0, 4.0)}, horizon=1)
+    source, target = parse("F[0,0] (0 <= x <= 1)"), parse("F[1,1] (2 <= x <= 4)")
+    # moved by 2 and a tick it is to be in [2,3] at tick 1: a half of what satisfies the target
+    assert aligned_dissimilarity(source, target, prior) == pytest.approx(1 / 2)
+    assert dissimilarity(source, target, prior) > 0.7
+    assert aligned_dissimilarity(parse("F[0,0] (1 <= x <= 3)"), target, prior) == 0
 
 
 def test_what_cannot_be_compared_is_refused():

@@ -5,8 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickwise.errors import FormulaError
-from tickwise.logic.alignment import Alignment, align
+from tickwise.logic.alignment import Alignment, align, aligned
 from tickwise.logic.parse import parse
+from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.structure import structurally_equivalent
 from tickwise.logic.syntax import Formula
 
 
@@ -33,9 +35,30 @@ def test_the_sources_disjuncts_are_taken_again():
 
 
 def test_other_structures_are_refused_in_one_line():
-    with pytest.raises(FormulaError, match="not structurally transferable") as caught:
-        align(parse("F[1,5] (x >= 1)"), parse("G[1,5] (x >= 1)"))
-    assert "\n" not in str(caught.value)
+    for function in (align, aligned):
+        with pytest.raises(FormulaError, match="not structurally transferable") as caught:
+            function(parse("F[1,5] (x >= 1)"), parse("G[1,5] (x >= 1)"))
+        assert "\n" not in str(caught.value)
+
+
+def test_a_source_laid_over_its_target_by_hand():
+    source = "F[1,5] G[0,2] (1 <= x <= 2 & 0 <= y <= 4) & F[9,12] !(3 <= x <= 5)"
+    target = "F[3,7] G[0,3] (4 <= x <= 6 & 1 <= y <= 4) & F[11,15] !(6 <= x <= 8)"
+    # x further on by 3; y by 0 as well as by 1, so by 0; later by 2
+    moved = "F[3,7] G[0,2] (4 <= x <= 5 & 0 <= y <= 4) & F[11,14] !(6 <= x <= 8)"
+    assert str(aligned(parse(source), parse(target))) == str(to_sdnf(parse(moved)))
+    # sides that are open in one only say nothing of the displacement
+    assert str(aligned(parse("F[1,5] (x >= 1)"), parse("F[2,5] (x <= 3)"))) == "F[1,5] (x >= 1)"
+
+
+def test_no_window_is_moved_before_the_beginning():
+    source, target = parse("F[2,5] (x >= 1) & G[30,40] (x >= 1)"), parse("F[1,2] (x >= 1) & G[3,4] (x >= 1)")
+    assert str(aligned(source, target)) == "F[0,3] (x >= 1) & G[28,38] (x >= 1)"  # not earlier by 27
+
+
+def test_each_disjunct_is_laid_over_one():
+    target = "F[4,8] (x >= 7) | F[9,13] (x >= -2)"
+    assert str(aligned(parse("F[1,5] (x >= 1)"), parse(target))) == target
 
 
 numbers = st.integers(-20, 20)
@@ -70,3 +93,12 @@ def test_what_remains_is_a_metric(a: Formula, b: Formula, c: Formula):
 def test_a_displaced_formula_is_no_other(sides: list[int], start: int, duration: int, shift: int, delay: int):
     plain, displaced = made(sides, start, duration), made(sides, start, duration, shift, delay)
     assert align(plain, displaced) == Alignment({"x": shift}, delay, {"x": 0}, 0)
+    assert aligned(plain, displaced) == to_sdnf(displaced)
+
+
+@given(formulas(), formulas())
+def test_a_formula_laid_over_another_is_displaced_no_more(source: Formula, target: Formula):
+    moved = aligned(source, target)
+    assert structurally_equivalent(moved, to_sdnf(target))
+    assert aligned(moved, target) == moved
+    assert align(moved, target).regions == align(source, target).regions

@@ -6,6 +6,7 @@ import math
 
 from tickwise.inference.information import log_mass
 from tickwise.inference.prior import Prior
+from tickwise.logic.alignment import aligned
 from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.logic.syntax import Formula
 
@@ -56,3 +57,24 @@ def dissimilarity(phi: Formula | SDNF, psi: Formula | SDNF, prior: Prior) -> flo
     if math.isinf(either):
         return 0.0
     return min(1.0, math.exp(log_mass(both, prior, lambda satisfied: satisfied[0] != satisfied[1]) - either))
+
+
+def aligned_dissimilarity(source: Formula | SDNF, target: Formula | SDNF, prior: Prior) -> float:
+    """The dissimilarity that remains once a source's formula is moved onto a target's in space and time.
+
+    Algorithm 2 compares states relative to the regions, so where a region lies is no difference to it; this leaves out
+    the displacement that the target's regions and windows have in common (see `tickwise.logic.alignment.aligned`).
+
+    Args:
+        source: A formula that can be brought to SDNF, or an SDNF.
+        target: Another one, structurally transferable from it.
+        prior: The prior distribution of the target's world; what it leaves undecided counts as satisfied.
+
+    Returns:
+        The conditional probability in [0, 1]; see `dissimilarity`.
+
+    Raises:
+        FormulaError: If the target is not structurally transferable from the source.
+        UnknownVariableError: If a formula names a variable that the prior does not have.
+    """
+    return dissimilarity(aligned(source, target), target, prior)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from statistics import fmean, median
+from dataclasses import dataclass, replace
+from statistics import fmean, median, median_low
 
 from tickwise.errors import FormulaError
-from tickwise.logic.sdnf import SDNF, Primitive, to_sdnf
+from tickwise.logic.sdnf import SDNF, Primitive, SequentialConjunction, to_sdnf
 from tickwise.logic.structure import structurally_transferable
-from tickwise.logic.syntax import Formula
+from tickwise.logic.syntax import Box, Formula, Interval, Not
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,33 +49,92 @@ def align(source: Formula | SDNF, target: Formula | SDNF) -> Alignment:
     Raises:
         FormulaError: If the target is not structurally transferable from the source.
     """
-    near, far = to_sdnf(source), to_sdnf(target)
-    if not structurally_transferable(far, near):
-        raise FormulaError(f"{far} cannot be laid over {near}: it is not structurally transferable (Definition 7)")
-    pairs = list(_pairs(near, far))
-    sides = [side for pair in pairs for side in _sides(*pair)]
+    pairs = [pair for disjuncts in _pairs(source, target) for pair in disjuncts]
     shifts, regions = {}, {}
-    for variable in dict.fromkeys(name for name, _ in sides):
-        differences = [difference for name, difference in sides if name == variable]
+    for variable, differences in _distances(pairs).items():
         shifts[variable], regions[variable] = _displaced([each for each in differences if math.isfinite(each)])
         if not all(map(math.isfinite, differences)):
             regions[variable] = math.inf
-    times = [
-        theirs - ours for first, second in pairs for ours, theirs in zip(_times(first), _times(second), strict=True)
-    ]
+    times = _delays(pairs)
     delay, _ = _displaced(times)
     durations = [second.duration - first.duration for first, second in pairs if first.operator.nested]
     return Alignment(shifts, delay, regions, fmean([abs(time - delay) for time in times] + [abs(d) for d in durations]))
 
 
-def _pairs(source: SDNF, target: SDNF) -> Iterator[tuple[Primitive, Primitive]]:
-    for number, disjunct in enumerate(target.disjuncts):
-        near = source.disjuncts[number % len(source.disjuncts)]
-        yield from zip(near.primitives, disjunct.primitives, strict=True)
+def aligned(source: Formula | SDNF, target: Formula | SDNF) -> SDNF:
+    """A source's formula moved onto a target's in space and time: the same requirement, only elsewhere and later.
+
+    Each disjunct of the target gets the source's that stands for it (Definition 7), displaced as a whole: sizes of
+    regions, lengths of windows, durations, and how regions and windows lie to one another remain the source's. Of
+    displacements that leave equally little (see `align`) it is the least, so that whole cells stay whole cells. No
+    window begins before tick 0; what lies beyond a world or an episode is left to the prior or world to judge.
+
+    Args:
+        source: A formula that can be brought to SDNF, or an SDNF.
+        target: Another one, structurally transferable from it.
+
+    Returns:
+        The displaced formula, structurally equivalent to the target.
+
+    Raises:
+        FormulaError: If the target is not structurally transferable from the source.
+    """
+    return SDNF(tuple(_laid_over(pairs) for pairs in _pairs(source, target)))
 
 
-def _times(primitive: Primitive) -> tuple[int, int]:
-    return primitive.window.start, primitive.window.end
+_Pairs = Sequence[tuple[Primitive, Primitive]]
+
+
+def _pairs(source: Formula | SDNF, target: Formula | SDNF) -> list[_Pairs]:
+    """For each disjunct of the target the pairs of a primitive of the source's and its own."""
+    near, far = to_sdnf(source), to_sdnf(target)
+    if not structurally_transferable(far, near):
+        raise FormulaError(f"{far} cannot be laid over {near}: it is not structurally transferable (Definition 7)")
+    return [
+        list(zip(near.disjuncts[number % len(near.disjuncts)].primitives, disjunct.primitives, strict=True))
+        for number, disjunct in enumerate(far.disjuncts)
+    ]
+
+
+def _laid_over(pairs: _Pairs) -> SequentialConjunction:
+    """The source's disjunct, displaced."""
+    shifts = {
+        variable: median_low([*filter(math.isfinite, differences)] or [0.0])
+        for variable, differences in _distances(pairs).items()
+    }
+    delay = max(median_low(_delays(pairs)), -pairs[0][0].start)
+    return SequentialConjunction(tuple(_moved(primitive, shifts, delay) for primitive, _ in pairs))
+
+
+def _moved(primitive: Primitive, shifts: dict[str, float], delay: int) -> Primitive:
+    window = Interval(primitive.window.start + delay, primitive.window.end + delay)
+    bounds = (
+        replace(bound, lower=bound.lower + shifts[bound.variable], upper=bound.upper + shifts[bound.variable])
+        for bound in primitive.box.bounds
+    )
+    box = Box(tuple(bounds))
+    return replace(primitive, window=window, predicate=Not(box) if primitive.complemented else box)
+
+
+def _distances(pairs: _Pairs) -> dict[str, list[float]]:
+    """By how much the target's sides lie further on, by variable; infinite where one side only is open."""
+    found: dict[str, list[float]] = {}
+    for pair in pairs:
+        for variable, difference in _sides(*pair):
+            found.setdefault(variable, []).append(difference)
+    return found
+
+
+def _delays(pairs: _Pairs) -> list[int]:
+    """By how many ticks the target's windows begin and end later."""
+    return [
+        theirs - ours
+        for source, target in pairs
+        for ours, theirs in (
+            (source.window.start, target.window.start),
+            (source.window.end, target.window.end),
+        )
+    ]
 
 
 def _sides(source: Primitive, target: Primitive) -> Iterator[tuple[str, float]]:
