@@ -7,12 +7,14 @@ agree with it.
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
-from itertools import accumulate, pairwise
+from itertools import accumulate, pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tickwise.automata.build import timed_automata
-from tickwise.inference.prior import BoxPrior, MarkovPrior, PathPrior, Prior
+from tickwise.inference.prior import BoxPrior, Chain, MarkovPrior, PathPrior, Prior
 from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.logic.syntax import Constant, Formula, Verdict
 
@@ -43,39 +45,49 @@ def log_mass(formulas: Sequence[SDNF], prior: Prior, counts: Callable[[tuple[boo
     bounds = list(accumulate((len(formula.disjuncts) for formula in formulas), initial=0))
     tables = [automaton.compile() for formula in formulas for automaton in timed_automata(formula)]
     chain = prior.chain([primitive.predicate for disjunct in disjuncts for primitive in disjunct.primitives])
-    deltas = [table.delta.tolist() for table in tables]
-    verdicts = [table.verdict.tolist() for table in tables]
-    widths = [len(disjunct.primitives) for disjunct in disjuncts]
-    letters = [_split(int(letter), widths) for letter in chain.letters]
-    steps = [
-        list(zip(chain.indices[low:high].tolist(), chain.weights[low:high].tolist(), strict=True))
-        for low, high in zip(chain.indptr[:-1].tolist(), chain.indptr[1:].tolist(), strict=True)
-    ]
+    letters = _split(chain.letters, [len(disjunct.primitives) for disjunct in disjuncts])
+    wanted = np.array([counts(each) for each in product((False, True), repeat=len(formulas))])
 
-    def said(u: tuple[int, ...]) -> tuple[int, ...]:
-        each = [verdict[part] for verdict, part in zip(verdicts, u, strict=True)]
-        return tuple(max(each[low:high]) for low, high in pairwise(bounds))
-
-    # mass[state, u]: weight of the paths to a chain state that bring the tables to the tuple u before reading it
-    start = (0,) * len(tables)
-    mass = {(state, start): weight for state, weight in enumerate(chain.initial.tolist()) if weight > 0}
+    # rows of a chain state, a state of each table before it reads the letter there, and the weight of the paths thither
+    state = np.flatnonzero(chain.initial > 0)
+    parts = np.zeros((len(state), len(tables)), dtype=np.int64)
+    mass = chain.initial[state]
     factor, counted_log = 0.0, -math.inf
     for tick in range(chain.horizon + 1):
-        counted = 0.0
-        moved: defaultdict[tuple[int, tuple[int, ...]], float] = defaultdict(float)
-        for (state, u), weight in mass.items():
-            after = tuple(delta[part][letter] for delta, part, letter in zip(deltas, u, letters[state], strict=True))
-            known = said(after)
-            if Verdict.UNKNOWN in known and tick < chain.horizon:
-                for successor, step in steps[state]:
-                    moved[successor, after] += weight * step / float(chain.scale[tick])
-            elif counts(tuple(verdict != Verdict.FALSE for verdict in known)):
-                counted += weight * float(chain.backward[tick, state])
+        each = zip(tables, parts.T, letters, strict=True)
+        parts = np.stack([table.delta[part, letter[state]] for table, part, letter in each], axis=1)
+        verdicts = np.stack([table.verdict[part] for table, part in zip(tables, parts.T, strict=True)], axis=1)
+        known = np.stack([verdicts[:, low:high].max(axis=1) for low, high in pairwise(bounds)], axis=1)
+        over = (known != Verdict.UNKNOWN).all(axis=1) | (tick == chain.horizon)
+        # which combination of satisfied formulas it is, as a number in binary
+        satisfied = (known != Verdict.FALSE) @ (1 << np.arange(len(formulas))[::-1])
+        counted = float((mass * chain.backward[tick, state])[over & wanted[satisfied]].sum())
         if counted > 0:
             counted_log = _log_add(counted_log, factor + math.log(counted))
-        mass, shift = _rescaled(moved)
-        factor += shift
+        if over.all():
+            break
+        state, parts, mass = _step(chain, tick, state[~over], parts[~over], mass[~over])
+        largest = mass.max()
+        if largest <= 1e-100:  # take out a common factor where all mass is tiny
+            mass, factor = mass / largest, factor + math.log(largest)
     return min(counted_log, 0.0)
+
+
+def _step(
+    chain: Chain, tick: int, state: NDArray[np.int64], parts: NDArray[np.int64], mass: NDArray[np.float64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+    """The rows after a step of the chain, each combination once."""
+    number = np.zeros(len(parts), dtype=np.int64)
+    for part in parts.T:  # small numbers throughout, however many tables there are
+        number = np.unique(number * (part.max() + 1) + part, return_inverse=True)[1].reshape(-1)
+    degree = np.diff(chain.indptr)[state]
+    origin = np.repeat(np.arange(len(state)), degree)
+    edge = np.arange(len(origin)) - np.repeat(np.cumsum(degree) - degree, degree) + chain.indptr[state][origin]
+    key = number[origin] * (len(chain.indptr) - 1) + chain.indices[edge]
+    _, first, place = np.unique(key, return_index=True, return_inverse=True)
+    arrived = np.zeros(len(first))
+    np.add.at(arrived, place.reshape(-1), mass[origin] * chain.weights[edge] / chain.scale[tick])
+    return chain.indices[edge][first], parts[origin][first], arrived
 
 
 def probability(phi: Formula | SDNF, prior: Prior) -> float:
@@ -117,24 +129,12 @@ def information_gain(phi: Formula | SDNF, prior: Prior) -> float:
     return 0.0 if math.isinf(logarithm) else -logarithm / prior.horizon + 0.0
 
 
-def _split(letter: int, widths: list[int]) -> tuple[int, ...]:
-    parts = []
-    for width in widths:
-        parts.append(letter & ((1 << width) - 1))
-        letter >>= width
-    return tuple(parts)
+def _split(letters: NDArray[np.int64], widths: list[int]) -> list[NDArray[np.int64]]:
+    """The letters of each table, from those of all predicates together."""
+    starts = accumulate(widths, initial=0)
+    return [letters >> start & ((1 << width) - 1) for start, width in zip(starts, widths, strict=False)]
 
 
 def _log_add(a: float, b: float) -> float:
     high, low = max(a, b), min(a, b)
     return high + math.log1p(math.exp(low - high))
-
-
-def _rescaled(
-    mass: dict[tuple[int, tuple[int, ...]], float],
-) -> tuple[dict[tuple[int, tuple[int, ...]], float], float]:
-    """Take out a common factor where all mass is tiny."""
-    largest = max(mass.values(), default=1.0)
-    if largest > 1e-100 or largest == 0:
-        return mass, 0.0
-    return {key: weight / largest for key, weight in mass.items()}, math.log(largest)
