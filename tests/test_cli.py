@@ -25,7 +25,16 @@ from tickwise.cli import app, main
 
 ROOT = Path(tests.__file__).parents[1]
 NAVAL = ROOT.parent / "shared" / "data" / "naval" / "naval.npz"
-COMMANDS = ("reproduce", "infer", "check", "automaton", "compare", "report", "effect")  # doctor has tests of its own
+COMMANDS = (
+    "reproduce",
+    "infer",
+    "check",
+    "automaton",
+    "compare",
+    "report",
+    "effect",
+    "library",
+)  # doctor has tests of its own
 FORMULA = "F[0,2] (x >= 3)"
 PLAIN = {"PATH": os.environ.get("PATH", ""), "HOME": os.environ.get("HOME", ""), "TERM": "dumb", "NO_COLOR": "1"}
 

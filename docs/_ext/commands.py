@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
@@ -29,7 +30,14 @@ class CommandLine(SphinxDirective):
         module, name = self.arguments[0].split(":")
         self.env.note_dependency(str(import_module(module).__file__))
         group: Any = typer.main.get_command(getattr(import_module(module), name))
-        return [self._section(group.name, command) for command in group.commands.values()]
+        return list(self._sections(group))
+
+    def _sections(self, group: Any) -> Iterator[nodes.section]:
+        """A section for each command, and, after that of a group of commands, for each in it."""
+        for command in group.commands.values():
+            yield self._section(group.name, command)
+            if hasattr(command, "commands"):
+                yield from (self._section(f"{group.name} {command.name}", each) for each in command.commands.values())
 
     def _section(self, program: str, command: Any) -> nodes.section:
         title = f"{program} {command.name}"

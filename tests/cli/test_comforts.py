@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from rich.console import Console
@@ -37,12 +38,24 @@ def logs(tmp_path: Path) -> Path:
 # ---------------------------------------------------------------- help
 
 
+def commands_of(group: Any, prefix: str = "") -> dict[str, Any]:
+    """All commands by what stands after ``tickwise``; groups of commands, and what is in them."""
+    found = {}
+    for name, command in group.commands.items():
+        found[prefix + name] = command
+        if hasattr(command, "commands"):
+            found |= commands_of(command, f"{prefix}{name} ")
+    return found
+
+
+EVERY = commands_of(get_command(app))
+
+
 def test_every_command_has_examples_that_are_command_lines(tickwise: Tickwise):
-    commands = get_command(app).commands  # type: ignore[attr-defined]
-    assert EXAMPLES.keys() <= commands.keys()
-    assert set(COMMANDS) <= commands.keys()
-    for name in commands:
-        answer = tickwise(name, "-h")
+    assert EXAMPLES.keys() <= EVERY.keys()
+    assert set(COMMANDS) <= EVERY.keys()
+    for name in EVERY:
+        answer = tickwise(*name.split(), "-h")
         assert answer.status == 0
         _, _, below = answer.out.partition("\n  Examples:\n")
         lines = below.splitlines()
@@ -57,9 +70,9 @@ def test_every_command_has_examples_that_are_command_lines(tickwise: Tickwise):
 
 @pytest.mark.parametrize("name", sorted(EXAMPLES))
 def test_examples_name_options_that_there_are(name: str):
-    command = get_command(app).commands[name]  # type: ignore[attr-defined]
-    known = {option for parameter in command.params for option in parameter.opts}
-    for line in re.findall(r"^ +tickwise \w+(.*)$", command.epilog, re.MULTILINE):
+    for line in re.findall(r"^ +tickwise (.*)$", EVERY[name].epilog, re.MULTILINE):
+        called = max((other for other in EVERY if f"{line} ".startswith(f"{other} ")), key=len)
+        known = {option for parameter in EVERY[called].params for option in parameter.opts}
         ours = re.split(r" [|>] ", line)[0]
         assert set(re.findall(r"--[a-z-]+", ours)) <= known, line
 
@@ -76,10 +89,9 @@ def test_the_exit_statuses_are_one_table():
 
 def test_the_reference_names_all_commands_and_global_options():
     text = REFERENCE.read_text(encoding="utf-8")
-    group = get_command(app)
-    for name in group.commands:  # type: ignore[attr-defined]
+    for name in EVERY:
         assert f"tickwise {name}" in text, name
-    for parameter in group.params:
+    for parameter in get_command(app).params:
         assert f"`{parameter.opts[0]}`" in text
 
 
@@ -125,6 +137,7 @@ def test_each_shell_is_told_what_fits(shell: str, line: str, expected: set[str])
         (completion.protocols, "", ["paper", "full"]),
         (completion.formats, "s", ["svg"]),
         (completion.searches, "", ["exact", "joint", "swarm"]),
+        (completion.numbers, "dis", ["dissimilarity", "distance"]),
     ],
 )
 def test_the_names_offered(provider, incomplete: str, expected: list[str]):

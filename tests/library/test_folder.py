@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
+from datetime import datetime, timedelta
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -15,7 +17,7 @@ from tickwise.library.folder import Library
 
 
 def entry(name: str = "reach") -> Entry:
-    return replace(learned(episodes=100), name=name)
+    return replace(learned(episodes=100), name=name, provenance={"version": "1", "date": "2026-01-31T12:00:00Z"})
 
 
 @pytest.fixture
@@ -36,6 +38,14 @@ def test_what_is_added_is_there(library: Library):
     assert files(library.folder) == {
         "library.json", "entries/reach.json", "entries/reach.npz", "entries/pair-07.b.json", "entries/pair-07.b.npz",
     }  # fmt: skip
+
+
+def test_what_has_no_date_gets_one(library: Library):
+    library.add(learned(episodes=100))
+    found = library.read("reach").provenance
+    assert found.keys() == {"version", "date", "episodes"}
+    assert datetime.fromisoformat(found["date"]).utcoffset() == timedelta(0)
+    assert found["version"] == version("tickwise")
 
 
 @pytest.mark.parametrize("name", ["reach", "REACH"])

@@ -24,8 +24,8 @@ import signal
 import sys
 import time
 import traceback
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import wraps
 from importlib.metadata import version as package_version
 from pathlib import Path
@@ -160,6 +160,16 @@ def _tell(message: str, as_json: bool) -> None:
 def print_json(document: Mapping[str, Any]) -> None:
     """Print one JSON document on a line."""
     print(json.dumps(document, ensure_ascii=False))
+
+
+@contextmanager
+def busy(text: str) -> Iterator[Callable[[str], None]]:
+    """Show on a terminal that work goes on; gives what changes the text."""
+    if not messages.is_terminal:
+        yield lambda _: None
+        return
+    with messages.status(text) as status:
+        yield lambda changed: status.update(changed)
 
 
 def _drop_output() -> None:

@@ -50,5 +50,12 @@ def searches(incomplete: str) -> list[str]:
     return _beginning(incomplete, SEARCHES)
 
 
+def numbers(incomplete: str) -> list[str]:
+    """What entries of a library can be ranked by."""
+    from tickwise.library.standing import ORDER
+
+    return _beginning(incomplete, ORDER)
+
+
 def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]

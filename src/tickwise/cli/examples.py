@@ -27,6 +27,19 @@ EXAMPLES = {
     ),
     "report": ("tickwise report runs/all",),
     "effect": ("tickwise effect tau --study case1 --runs 5", "tickwise effect list"),
+    "library": (
+        "tickwise library add tasks case1 --run runs/case1",
+        "tickwise library list tasks",
+        "tickwise library rank tasks logs.npz --study case1",
+        "tickwise library transfer tasks logs.npz start.npz --study case1",
+    ),
+    "library add": ("tickwise library add tasks mine --formula PHI --q q.npy --world world.npz",),
+    "library list": ("tickwise library list tasks --json > tasks.json",),
+    "library rank": (
+        "tickwise library rank tasks logs.npz --world world.npz --by distance",
+        "tickwise library rank tasks logs.csv --json > ranking.json",
+    ),
+    "library transfer": ("tickwise library transfer tasks logs.npz new.npz --study case1 --entry mine",),
     "doctor": ("tickwise doctor --json > doctor.json",),
 }
 """Examples beside the one in a command's docstring, by the command's name."""
@@ -41,17 +54,27 @@ class Description(TypedDict):
     epilog: str
 
 
-def described(function: Callable[..., Any]) -> Description:
+def epilog_of(name: str, first: str = "") -> str:
+    """What stands below the options of a command: its examples.
+
+    Args:
+        name: The command's name.
+        first: The example that comes before those of `EXAMPLES`.
+    """
+    lines = [f"  {each}" for each in (*filter(None, [first]), *EXAMPLES.get(name, ()))]
+    # the mark keeps the lines that follow it as they are
+    return "\b\n" + "\n".join(("Examples:", *lines)) if lines else ""
+
+
+def described(function: Callable[..., Any], name: str | None = None) -> Description:
     """A command's help, with its examples below the options.
 
     Args:
         function: The command; its docstring may have an example after ``For example:``, to its end.
+        name: What stands after ``tickwise``; the function's name if left out.
 
     Returns:
         Arguments of typer's ``command``.
     """
     words, _, example = (inspect.getdoc(function) or "").partition(_MARK)
-    first = [" ".join(example.split())] if example else []
-    lines = [f"  {each}" for each in (*first, *EXAMPLES.get(function.__name__, ()))]
-    # the mark keeps the lines that follow it as they are
-    return {"help": words.strip(), "epilog": "\b\n" + "\n".join(("Examples:", *lines)) if lines else ""}
+    return {"help": words.strip(), "epilog": epilog_of(name or function.__name__, " ".join(example.split()))}

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tickwise.cli import completion
-from tickwise.cli.app import COLUMNS, INTERRUPTED, JsonFlag, command, messages, output, print_json
+from tickwise.cli.app import COLUMNS, INTERRUPTED, JsonFlag, busy, command, messages, output, print_json
 from tickwise.cli.evidence import page_path, show_explanation, show_validation, write_page
 from tickwise.errors import ConfigurationError
 
@@ -109,7 +107,7 @@ def _fit(
 
     from tickwise.inference.validation import hold_out, states_of
 
-    with _searching("searching ..."):
+    with busy("searching ..."):
         if holdout is None:
             return model.fit(states_of(known), known.labels), known, None
         model, judged = hold_out(model, known, holdout, seed)
@@ -121,7 +119,7 @@ def _in_folds(model: MITLClassifier, known: LabelledTrajectories, folds: int, se
     """Cross-validate; on a terminal a line tells of each fold. None where Ctrl-C came before the first was finished."""
     from tickwise.inference.validation import cross_validate, percent
 
-    with _searching(f"fold 1 of {folds} ...") as say:
+    with busy(f"fold 1 of {folds} ...") as say:
 
         def report(number: int, trial: Trial) -> None:
             if messages.is_terminal:
@@ -133,16 +131,6 @@ def _in_folds(model: MITLClassifier, known: LabelledTrajectories, folds: int, se
             return cross_validate(model, known, folds, seed, report)
         except KeyboardInterrupt:
             return None
-
-
-@contextmanager
-def _searching(text: str) -> Iterator[Callable[[str], None]]:
-    """Show on a terminal that work goes on; gives what changes the text."""
-    if not messages.is_terminal:
-        yield lambda _: None
-        return
-    with messages.status(text) as status:
-        yield lambda changed: status.update(changed)
 
 
 def _facts(model: MITLClassifier, learned: LabelledTrajectories, spent: float) -> dict[str, Any]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 from tickwise.envs.catalog import (
     CASE_STUDY_1_SOURCE,
@@ -10,7 +13,7 @@ from tickwise.envs.catalog import (
     CASE_STUDY_2_SOURCE,
     CASE_STUDY_2_TARGET,
 )
-from tickwise.errors import ConfigurationError
+from tickwise.errors import ConfigurationError, StoreError
 from tickwise.experiments.random_pairs import find_pair
 from tickwise.experiments.study import Collection, Goal, Learning, Published, StudySpec, check_protocol
 from tickwise.inference.swarm import SwarmSettings
@@ -134,3 +137,23 @@ def find_study(
         raise ConfigurationError(f"the seed is {seed}; use 0 or more")
     spec = STUDIES[name].quick() if quick else STUDIES[name]
     return replace(spec, seed=seed, protocol=protocol, runs=spec.runs if runs is None else runs)
+
+
+def study_of(config: Mapping[str, Any], folder: Path) -> StudySpec:
+    """The specification of the study that a run folder's configuration belongs to.
+
+    Args:
+        config: What `config.json` holds.
+        folder: The run folder.
+
+    Raises:
+        StoreError: If it is no study's configuration.
+        ConfigurationError: If there is no such study any more.
+    """
+    try:
+        asked = {"quick": config["short"], **{key: config[key] for key in ("runs", "seed", "protocol")}}
+        return find_study(config["name"], **asked)
+    except KeyError as error:
+        raise StoreError(
+            f"{folder / 'config.json'} holds no configuration of a run (there is no {error}); name another folder"
+        ) from None

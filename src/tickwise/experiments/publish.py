@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tickwise.errors import MissingFileError, StoreError
-from tickwise.experiments.case_studies import find_study
+from tickwise.experiments.case_studies import study_of
 from tickwise.experiments.effect_catalog import EFFECTS
 from tickwise.experiments.effect_part import effect_part
 from tickwise.experiments.effects import effect_results
@@ -88,13 +88,7 @@ def republish(folder: Path) -> dict[str, Any]:
         raise MissingFileError(f"{folder} holds no run (there is no config.json); name a folder that reproduce wrote")
     if "suite" in config:
         return _republish_suite(suite_of(config, folder), folder)
-    try:
-        asked = {"quick": config["short"], **{key: config[key] for key in ("runs", "seed", "protocol")}}
-        spec = find_study(config["name"], **asked)
-    except KeyError as error:
-        raise StoreError(
-            f"{folder / 'config.json'} holds no configuration of a run (there is no {error}); name another folder"
-        ) from None
+    spec = study_of(config, folder)
     store = Store.open(folder, spec.as_dict())
     _require_finished([Unit("", spec, folder)], [store], folder, command(spec))
     return _publish_study(spec, store, read_json(folder / "environment.json"))

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -109,6 +111,12 @@ def centroids(formula: SDNF, mdp: TabularMDP) -> tuple[NDArray[np.float64], ...]
         np.array([primitive.box.centroid(mdp.variables, mdp.limits) for primitive in disjunct.primitives])
         for disjunct in formula.disjuncts
     )
+
+
+def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:
+    """A provenance with the version of Tickwise and the date, in UTC, where it has none."""
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return {"version": version("tickwise"), "date": now.replace("+00:00", "Z"), **provenance}
 
 
 def _check_variables(formula: SDNF, mdp: TabularMDP) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from tickwise._archives import json_bytes
 from tickwise._files import TEMPORARY, write_bytes
 from tickwise._wording import brief, listed
 from tickwise.errors import ConfigurationError, MissingFileError, StoreError
-from tickwise.library.entry import Entry, check_name
+from tickwise.library.entry import Entry, check_name, stamped
 from tickwise.library.entry_files import damaged, read_entry, read_manifest, write_entry
 from tickwise.library.opening import read_file
 
@@ -84,7 +84,7 @@ class Library:
         """Add an entry, wholly or not at all.
 
         Args:
-            entry: The entry.
+            entry: The entry; to its provenance version and date are added, where it has none.
 
         Returns:
             The path of its manifest.
@@ -94,7 +94,8 @@ class Library:
             StoreError: If it cannot be written; nothing of it is left behind.
         """
         self.require_free(entry.name)
-        return write_entry(self._entries / f"{entry.name}.json", entry)[1]
+        stamped_entry = replace(entry, provenance=stamped(entry.provenance))
+        return write_entry(self._entries / f"{entry.name}.json", stamped_entry)[1]
 
     def require_free(self, name: str) -> None:
         """Refuse a name that is none, or that an entry has.

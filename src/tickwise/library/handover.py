@@ -2,28 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from datetime import UTC, datetime
-from importlib.metadata import version
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError
 from tickwise.inference.fit import Fit
-from tickwise.library.entry import Entry, centroids
+from tickwise.library.entry import Entry, centroids, stamped
 from tickwise.library.target import Target
 from tickwise.logic.sdnf import SDNF
 from tickwise.rl.states import Memory, automaton_memory, disjunct_choice
 from tickwise.transfer.hypothesis import tick_tables
 from tickwise.transfer.qtransfer import transfer_q
-
-
-def stamped(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """A provenance with the version of Tickwise and the date, in UTC."""
-    now = datetime.now(UTC).isoformat(timespec="seconds")
-    return {**provenance, "version": version("tickwise"), "date": now.replace("+00:00", "Z")}
 
 
 def transferred_values(entry: Entry, formula: SDNF, target: Target) -> tuple[Memory, NDArray[np.float32]]:
