@@ -100,7 +100,7 @@ class Facade(SphinxDirective):
         return node.children
 
 
-_PACKAGES = ("logic", "automata", "envs", "inference", "rl", "transfer", "experiments", "errors")
+_PACKAGES = ("logic", "automata", "envs", "inference", "rl", "transfer", "library", "experiments", "errors")
 
 
 def _signature_of_the_source(

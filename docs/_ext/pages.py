@@ -25,7 +25,7 @@ from tickwise.cli import main
 from tickwise.cli.app import output
 
 DOCS = Path(__file__).parents[1]
-PAGES = ("tutorial", "concepts", "how-to/add-a-case-study", "how-to/many-seeds", "how-to/other-tools")
+PAGES = ("tutorial", "concepts", "how-to/add-a-case-study", "how-to/library", "how-to/many-seeds", "how-to/other-tools")
 """The pages whose blocks are run, each in a folder of its own."""
 
 FIGURES = {"curves.svg": "tutorial-curves.svg"}
@@ -122,8 +122,8 @@ def _command(step: Step) -> None:
 
 
 def same(printed: str, shown: str) -> bool:
-    """Whether two outputs agree but for times, such as ``0.3 s``."""
-    times = re.compile(r"\d+\.\d s\b")
+    """Whether two outputs agree but for times, such as ``0.3 s``, and dates."""
+    times = re.compile(r"\d+\.\d s\b|\b\d{4}-\d\d-\d\d\b")
     return times.sub("… s", printed) == times.sub("… s", shown)
 
 

@@ -116,5 +116,5 @@ def test_every_public_name_has_its_entry(pages: dict[Path, _Page]):
 
 def test_every_command_has_its_section(site: Path, pages: dict[Path, _Page]):
     commands = pages[site / "reference" / "commands.html"].anchors
-    wanted = ("reproduce", "infer", "check", "automaton", "compare", "report", "effect")
+    wanted = ("reproduce", "infer", "check", "automaton", "compare", "report", "effect", "library", "library-rank")
     assert {f"tickwise-{name}" for name in wanted} <= commands

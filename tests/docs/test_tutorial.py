@@ -74,6 +74,7 @@ def test_an_output_belongs_to_code():
 
 def test_times_may_differ_and_nothing_else():
     assert pages.same("rate 1.0, 0.9 s\n", "rate 1.0, 12.1 s\n")
+    assert pages.same("added 2026-01-31\n", "added 2025-12-01\n")
     assert not pages.same("rate 1.0, 0.9 s\n", "rate 1.1, 0.9 s\n")
 
 
