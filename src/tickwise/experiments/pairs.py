@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 from tickwise.experiments.measures import median_statistics, sure_ratio
+from tickwise.experiments.pair_budget import pair_budget, suite_budget
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import StudySpec
 from tickwise.experiments.summary import PAIRS, gather
@@ -28,7 +29,8 @@ def gather_pairs(specs: Sequence[StudySpec], stores: Sequence[Store], version: s
         version: The version of Tickwise that made them.
 
     Returns:
-        A mapping with ``pairs`` (a row a pair), ``identification`` (for each of `KINDS` the number ``right``, ``of``
+        A mapping with ``pairs`` (a row a pair), ``budget`` (all target episodes; see `suite_budget`),
+        ``identification`` (for each of `KINDS` the number ``right``, ``of``
         how many, the ``share`` and its 95 % Wilson interval ``low`` to ``high``) and ``speed_ups`` (for each pair of
         methods and measure the ``median`` over the pairs of tasks with its interval; see `median_statistics`).
 
@@ -40,6 +42,7 @@ def gather_pairs(specs: Sequence[StudySpec], stores: Sequence[Store], version: s
     seed = specs[0].seed if specs else 0
     return {
         "pairs": rows,
+        "budget": suite_budget(rows, seed),
         "identification": {
             kind: _share([row for row in rows if row["similar"] == (kind == "similar")]) for kind in KINDS
         },
@@ -77,6 +80,7 @@ def _row(spec: StudySpec, results: Mapping[str, Any]) -> dict[str, Any]:
             for method, found in summary["methods"].items()
         },
         "speed_ups": _speed_ups(spec, summary["methods"]),
+        "budget": pair_budget(spec, summary["methods"]),
     }  # fmt: skip
 
 

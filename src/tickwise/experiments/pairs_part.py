@@ -12,6 +12,7 @@ from tickwise.experiments.page import Part, inline_svg, template
 from tickwise.experiments.pairs import KINDS
 from tickwise.experiments.report import settings_tree
 from tickwise.experiments.study import StudySpec
+from tickwise.experiments.verdict import count
 from tickwise.logic.parse import parse
 from tickwise.logic.render import to_unicode
 from tickwise.logic.sdnf import to_sdnf
@@ -23,6 +24,7 @@ _MEANINGS = {"I/III": "what the formula saves", "III/IV": "what the transfer sav
 _SECTIONS = {
     "identification": "Identification",
     "speed-ups": "Speed-up",
+    "budget": "All episodes",
     "pairs": "Every pair",
     "pair-settings": "Settings",
 }
@@ -52,11 +54,12 @@ def pairs_part(results: Mapping[str, Any], specs: Sequence[StudySpec], figure: s
         speed_ups=[_speed_up(pair, results["speed_ups"][pair]) for pair in results["speed_ups"]],
         measures=list(_MEASURES.values()),
         goal=specs[0].learning.goal.text,
+        budget=_budget(results["budget"]),
         limit=max(specs[0].learning.most_episodes.values()),
         pairs=[_pair(row) for row in results["pairs"]],
         settings=settings_tree(shared),
     )
-    links = [(prefix + name, label) for name, label in _SECTIONS.items()]
+    links = [(prefix + name, label) for name, label in _SECTIONS.items() if name != "budget" or results["budget"]["of"]]
     found = pairs_verdict(results)
     return Part(KEY, "Random pairs of tasks", found, links, Markup(body), " ".join(found))
 
@@ -77,7 +80,35 @@ def pairs_verdict(results: Mapping[str, Any]) -> list[str]:
                 f"In the median over {median['count']} pairs {text} {median['median']:.1f} "
                 f"[{median['low']:.1f}, {median['high']:.1f}]."
             )
+    budget = results["budget"]
+    if budget["ratio"]["median"] is not None:
+        found = budget["ratio"]
+        sentences.append(
+            f"With collection counted, the closed loop gets to 95 % of V* in {found['median']:.1f} "
+            f"[{found['low']:.1f}, {found['high']:.1f}] times fewer episodes than Method IV, and on "
+            f"{len(budget['negative'])} of {budget['of']} pairs it needs more than learning without transfer."
+        )
     return sentences
+
+
+def _budget(found: Mapping[str, Any]) -> dict[str, Any]:
+    cells = [_episodes(found["median"][name]) for name in ("IV", "V")] + [_times(found["ratio"])]
+    cells.append({"text": f"{found['reached']} of {found['of']}", "note": "pairs, most runs"})
+    cells.append({"text": f"{len(found['negative'])} of {found['of']}", "note": ", ".join(found["negative"])})
+    return {"of": found["of"], "cells": cells}
+
+
+def _episodes(found: Mapping[str, Any]) -> dict[str, str]:
+    if found["median"] is None:
+        return {"text": "–", "note": ""}
+    low, high = (count(value) for value in (found["low"], found["high"]))
+    return {"text": count(found["median"]), "note": f"{low} to {high}; {found['count']} pairs"}
+
+
+def _times(found: Mapping[str, Any]) -> dict[str, str]:
+    if found["median"] is None:
+        return {"text": "–", "note": ""}
+    return {"text": f"{found['median']:.1f}", "note": f"{found['low']:.1f} to {found['high']:.1f}"}
 
 
 def _figure(prefix: str, svg: str, results: Mapping[str, Any]) -> dict[str, Any]:
@@ -118,7 +149,8 @@ def _pair(row: Mapping[str, Any]) -> dict[str, Any]:
         **{task: _task(row, task) for task in ("source", "target")},
         "right": row["right"], "answer": "identified" if row["identified"] else "refused",
         "reason": row["reason"],
-        "ratios": [f"{row['speed_ups'][pair]['goal']:.1f}" if row["speed_ups"] else "–" for pair in _MEANINGS],
+        "ratios": [f"{row['speed_ups'][pair]['goal']:.1f}" if row["speed_ups"] else "–" for pair in _MEANINGS]
+        + ["–" if row["budget"]["ratio"] is None else f"{row['budget']['ratio']:.1f}"],
     }  # fmt: skip
 
 

@@ -36,6 +36,14 @@ def _pairs(found: Mapping[str, Any]) -> Iterator[str]:
     for kind, verb in (("similar", "identified"), ("dissimilar", "refused")):
         row = found["identification"][kind]
         yield f"{kind} pairs {verb}: {row['right']} of {row['of']}"
+    budget = found["budget"]
+    if budget["ratio"]["median"] is not None:
+        ratio = budget["ratio"]
+        yield (
+            f"IV/V by all target episodes to 95 % of V*: median {ratio['median']:.1f} "
+            f"[{ratio['low']:.1f}, {ratio['high']:.1f}] over {ratio['count']} pairs"
+        )
+        yield f"V needs more than learning without transfer: {len(budget['negative'])} of {budget['of']} pairs"
     for pair, measures in found["speed_ups"].items():
         goal = measures["goal"]
         if goal["median"] is not None:
