@@ -188,7 +188,7 @@ def slow_replan(problem: Problem, form: ModelBased, counts: Counts, given: NDArr
         left = problem.task.horizon - t
         return max(left - 1, 0) * max(best[0], best[2], best[4]) + max(best[1], best[3], best[5])
 
-    return SlowPlan(problem, counts.outcomes, form.known, reward, ends, unknown)
+    return SlowPlan(problem, counts.outcomes.copy(), form.known, reward, ends, unknown)
 
 
 def slow_model_learning(

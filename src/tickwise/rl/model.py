@@ -73,7 +73,7 @@ class ModelBased:
         Args:
             problem: What to learn; the tick is put into its memory.
             q: What pairs of a state and an action that are not known yet are taken to be worth, such as transferred
-                values, shape ``(memory states, states, actions)``; None for the best that was ever seen.
+                values, shape ``(memory states, states, actions)``; None for the best that was seen or is hoped for.
             counts: What is known of the world already; it is gone on with, not copied.
         """
         unrolled = unroll(problem.memory, problem.task.horizon)
@@ -140,8 +140,11 @@ class ModelLearner:
     def replan(self) -> None:
         """Plan for the rewards on what was counted so far."""
         reward, ends = expectations(self.counts, self.settings)
-        best = np.maximum(reward.max(axis=1), 0.0)
         left = self.problem.task.horizon - self.unrolled.tick
+        # where a formula is decided by the end, "unknown at the last tick" is never seen, and would be hoped for always
+        occurring = np.unique(2 * (self.unrolled.verdict + 1) + (left == 0))
+        best = np.zeros(CLASSES)
+        best[occurring] = np.maximum(reward[occurring].max(axis=1), 0.0)
         worth = np.maximum(left - 1, 0) * best[::2].max() + best[1::2].max()
         sweep(self.problem, self.unrolled, self.counts, self.settings.known, reward, ends, worth, self.given, self.q)
 
