@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from tickwise.automata.build import timed_automata
 from tickwise.envs.catalog import CASE_STUDY_1_TARGET
 from tickwise.envs.planning import optimal_value
 from tickwise.envs.temporal import sdnf_table
+from tickwise.errors import ConfigurationError
 from tickwise.experiments.case_studies import CASE_STUDY_1
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import to_sdnf
@@ -210,3 +212,49 @@ def test_case_study_1_is_learned_in_a_few_hundred_episodes():
         value = evaluate(learner.problem, learner.q, seed, 400)
     assert value >= 0.95 * best
     assert episodes > 20
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"known": 0}, "known is 0; use a whole number, 1 or more"),
+        ({"known": 1.5}, "known is 1.5; use a whole number, 1 or more"),
+        ({"known": math.nan}, "known is nan; use a whole number, 1 or more"),
+        ({"hope": math.nan}, "hope is nan and pooling 0.01; use a finite number, and one above 0"),
+        ({"hope": math.inf}, "hope is inf"),
+        ({"pooling": 0.0}, "pooling 0.0; use a finite number, and one above 0"),
+        ({"pooling": math.nan}, "pooling nan"),
+        ({"pooling": math.inf}, "pooling inf"),
+        ({"form": "q"}, "the form of ModelBased is 'model', not 'q'"),
+    ],
+)
+def test_settings_that_do_not_fit_are_refused(arguments: dict[str, Any], message: str):
+    with pytest.raises(ConfigurationError, match=message) as caught:
+        ModelBased(**arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_of_another_shape_is_refused():
+    problem = a_problem()
+    learner = ModelBased().learner(problem)
+    q, rng, start = learner.q, np.random.default_rng(0), np.zeros(1, np.int32)
+    counts = no_counts(chance_world(2))
+    refused = [
+        ("the values to begin with have shape", lambda: ModelBased().learner(problem, q[:1])),
+        (
+            r"outcomes of the counts has shape \(5, 2, 1\); use",
+            lambda: ModelBased().learner(problem, counts=no_counts(crossroads())),
+        ),
+        (
+            "ends of the counts has shape",
+            lambda: ModelBased().learner(problem, counts=counts._replace(ends=counts.ends[:2])),
+        ),
+        ("the table to play has shape", lambda: learner.play(rng, q[:-1])),
+        ("the starts to imagine from", lambda: imagined(learner, start[:0], 1, rng)),
+        ("the starts to imagine from", lambda: imagined(learner, start + 2, 1, rng)),
+        ("the starts to imagine from", lambda: imagined(learner, start - 1, 1, rng)),
+    ]
+    for message, call in refused:
+        with pytest.raises(ConfigurationError, match=message) as caught:
+            call()
+        assert "\n" not in str(caught.value)

@@ -58,8 +58,8 @@ class ModelBased:
 
     def __post_init__(self) -> None:
         check_form(self)
-        if self.known < 1:
-            raise ConfigurationError(f"known is {self.known}; a pair is known once it was met 1 time or more often")
+        if not isinstance(self.known, int) or self.known < 1:
+            raise ConfigurationError(f"known is {self.known}; use a whole number, 1 or more")
         if not (np.isfinite(self.hope) and 0 < self.pooling < np.inf):
             raise ConfigurationError(
                 f"hope is {self.hope} and pooling {self.pooling}; use a finite number, and one above 0"
@@ -74,10 +74,19 @@ class ModelBased:
             problem: What to learn; the tick is put into its memory.
             q: What pairs of a state and an action that are not known yet are taken to be worth, such as transferred
                 values, shape ``(memory states, states, actions)``; None for the best that was seen or is hoped for.
-            counts: What is known of the world already; it is gone on with, not copied.
+            counts: What is known of the world already; it is gone on with, not copied. Its rewards and ends are by what
+                the automaton said when they were met, even if that was another formula's.
+
+        Raises:
+            ConfigurationError: If the values or the counts have another shape than the problem.
         """
         unrolled = unroll(problem.memory, problem.task.horizon)
-        counts = no_counts(problem.mdp) if counts is None else counts
+        nothing = no_counts(problem.mdp)
+        counts = nothing if counts is None else counts
+        for name in Counts._fields:
+            found, wanted = getattr(counts, name).shape, getattr(nothing, name).shape
+            if found != wanted:
+                raise ConfigurationError(f"{name} of the counts has shape {found}; use {wanted}")
         given = np.empty((0, 1, 1), np.float32) if q is None else first_values(problem, 0.0, q)[unrolled.state]
         return ModelLearner(Problem(problem.mdp, problem.task, unrolled.memory), unrolled, counts, self, given)
 
@@ -122,14 +131,19 @@ class ModelLearner:
 
         Args:
             rng: The generator that all draws come from.
-            q: The table to play; None for the plan.
+            q: The table to play, of the plan's shape; None for the plan.
 
         Returns:
             As `learn`, for one episode.
+
+        Raises:
+            ConfigurationError: If the table has another shape.
         """
+        table = self.q if q is None else q
+        if table.shape != self.q.shape:
+            raise ConfigurationError(f"the table to play has shape {table.shape}; use that of the plan, {self.q.shape}")
         paths = np.empty((1, self.problem.task.horizon + 1), np.int32)
         stream = take_stream(rng)
-        table = self.q if q is None else q
         arguments: tuple[Any, ...] = (
             *self.problem.arrays, self.unrolled.verdict, stream, table, self.counts, paths[0],
         )  # fmt: skip
@@ -185,13 +199,15 @@ def sweep(
 
 
 def satisfying_plan(learner: ModelLearner) -> NDArray[np.float32]:
-    """Plan to satisfy the memory's formula, in the world as far as it was met; rewards play no part.
+    """Plan to satisfy the memory's formula, in the world as far as it was met; rewards and ends play no part.
 
     Args:
-        learner: What was met. What is not known is taken to satisfy.
+        learner: What was met. What is not known is taken to satisfy, unless the formula is false already.
 
     Returns:
-        The probability that the formula is satisfied, in the weak view, shape ``(memory states, states, actions)``.
+        The greatest probability that the formula is satisfied, in the weak view: it is not false at the last tick.
+        Shape ``(memory states, states, actions)``, 0 at that tick. Of several disjuncts it is the one that the memory
+        follows.
     """
     problem, unrolled = learner.problem, learner.unrolled
     q = np.zeros_like(learner.q)
@@ -215,8 +231,15 @@ def imagined(
 
     Returns:
         MDP states, shape ``(episodes, horizon + 1)``.
+
+    Raises:
+        ConfigurationError: If there is no state to begin in, or it is none of the world.
     """
     problem, memory = learner.problem, learner.problem.memory
+    if not len(starts) or starts.min() < 0 or starts.max() >= problem.mdp.n_states:
+        raise ConfigurationError(
+            f"the starts to imagine from are {starts}; use states from 0 to {problem.mdp.n_states - 1}"
+        )
     paths = np.empty((episodes, problem.task.horizon + 1), np.int32)
     stream = take_stream(rng)
     arrays = (problem.mdp.successor, memory.start, memory.delta, memory.letter)

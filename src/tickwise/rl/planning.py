@@ -141,7 +141,7 @@ def plan(
         worth: What an unknown pair is taken to be worth in each memory state, shape ``(memory states,)``.
         given: The same by pair, such as transferred values, shape ``(memory states, states, actions)``; of no memory
             states where `worth` counts.
-        q: Filled, shape ``(memory states, states, actions)``; 0 at the last tick.
+        q: Filled, shape ``(memory states, states, actions)``; 0 at the last tick, where no action is left to take.
     """
     states, actions, slots = successor.shape
     following = np.empty((len(memory_delta), states), dtype=np.float64)
@@ -183,7 +183,9 @@ def imagine(
     q: NDArray[np.float32],
     paths: NDArray[np.int32],
 ) -> None:
-    """Play greedily, ties at random, in the world as far as it was met; what is not known stays where it is.
+    """Play greedily, ties at random, in the world as far as it was met.
+
+    Where an action never was, the state stays as it is to the end, and nothing more is drawn for the episode.
 
     ``starts``, shape ``(n,)``, are MDP states, one of which is drawn at the beginning of each episode; ``paths``, shape
     ``(episodes, horizon + 1)``, is filled with MDP states. The rest is as in `plan`.

@@ -14,17 +14,17 @@ from tickwise.rl.states import Memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unrolled:
-    """The pairs (tick, memory state) that occur, as a memory: no state is met twice in an episode.
+    """The pairs (tick, memory state) that words of the world's letters lead to, as a memory; none is met twice.
 
     Planning on it is a single sweep from the last tick to the first. An automaton's clocks mostly tell the tick
     anyhow, so that there are few more pairs than states.
 
     Attributes:
-        memory: The memory over the pairs, which are numbered by tick.
+        memory: The memory over the pairs, which are numbered by tick, and of one tick by state.
         tick: The tick of each pair, int32, shape ``(pairs,)``.
         state: The memory state of each pair, int32, shape ``(pairs,)``.
-        verdict: What the automaton says in it: 1 true, 0 unknown, -1 false, int8, shape ``(pairs,)``; 0 for a memory
-            without automata.
+        verdict: What the automaton that is followed says in it: 1 true, 0 unknown, -1 false, int8, shape ``(pairs,)``;
+            0 for a memory without automata.
     """
 
     memory: Memory
@@ -41,7 +41,7 @@ def unroll(memory: Memory, horizon: int) -> Unrolled:
         horizon: The length L of an episode, in ticks; a pair of tick L has itself as its successor.
 
     Returns:
-        The memory over the reachable pairs.
+        The memory over the pairs.
 
     Raises:
         ConfigurationError: If the horizon is less than 1.
