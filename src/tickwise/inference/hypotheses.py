@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise.errors import ConfigurationError
 from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
 from tickwise.inference.objective import Objective
 from tickwise.inference.prior import Prior
@@ -44,6 +45,9 @@ class Hypotheses:
         copies: How many copies of the structure are joined by ∨ (Definition 7).
         positions: Their positions in the space, shape ``(n, dimensions)``.
         errors: The weighted share of trajectories that each misclassifies, shape ``(n,)``.
+
+    Raises:
+        ConfigurationError: If the structure does not fit into the space's horizon.
     """
 
     source: SDNF
@@ -56,6 +60,12 @@ class Hypotheses:
     errors: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
+        if not self.space.room(self.shape, self._gaps):
+            longest = max(len(disjunct.primitives) for disjunct in self.source.disjuncts)
+            raise ConfigurationError(
+                f"{longest} primitives one after the other do not fit into {self.space.horizon} ticks; "
+                "use a longer horizon"
+            )
         self.positions = self._drawn(self.count)
         self.errors = np.zeros(self.count)
 
@@ -94,7 +104,12 @@ class Hypotheses:
             parts = [self.positions]
 
     def grow(self, data: LabelledTrajectories, weights: NDArray[np.float64]) -> None:
-        """Go on with one more copy of the structure, put together from conjunctions that let no negative through."""
+        """Go on with one more copy of the structure, put together from conjunctions that let no negative through.
+
+        Raises:
+            DataError: If a label is missing.
+        """
+        data.require_both_classes()
         width = self.positions.shape[1] // self.copies
         single = [self.positions[:, i * width : (i + 1) * width] for i in range(self.copies)]
         alone = structure_shape(self.source)
