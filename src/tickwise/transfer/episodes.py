@@ -96,10 +96,11 @@ class Episodes:
             The trajectories, and weights that sum up to 1 where there are all kinds (see `SHARES`).
         """
         paths, good = self.paths, self.good
-        broken = ~good & self.problem.terminated(paths) & (paths[:, 2] >= 0)
+        lengths = (paths >= 0).sum(axis=1)
+        broken = ~good & self.problem.terminated(paths) & (lengths > 2)
         rows = np.flatnonzero(broken & prefixes)
         cut = paths[rows]
-        cut[np.arange(len(cut)), (cut >= 0).sum(axis=1) - 1] = -1
+        cut[np.arange(len(cut)), lengths[rows] - 1] = -1
         labels = np.concatenate([np.where(good, 1, -1), np.ones(len(cut), int)]).astype(np.int8)
         weights = np.zeros(len(labels))
         kinds = (np.flatnonzero(~good), np.flatnonzero(good), np.arange(len(good), len(labels)))
