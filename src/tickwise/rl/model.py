@@ -101,7 +101,6 @@ class ModelLearner:
         counts: What was met.
         settings: The settings.
         given: Values of what is not known yet; of no memory states where there are none.
-        q: The values of the empirical model.
     """
 
     problem: Problem
@@ -109,11 +108,24 @@ class ModelLearner:
     counts: Counts
     settings: ModelBased
     given: NDArray[np.float32]
-    q: NDArray[np.float32] = field(init=False)
+    _q: NDArray[np.float32] = field(init=False)
+    _stale: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
-        self.q = np.zeros((self.problem.memory.n_states, self.problem.mdp.n_states, self.problem.mdp.n_actions), "f4")
-        self.replan()
+        shape = (self.problem.memory.n_states, self.problem.mdp.n_states, self.problem.mdp.n_actions)
+        self._q = np.zeros(shape, np.float32)
+
+    @property
+    def q(self) -> NDArray[np.float32]:
+        """The values of the empirical model, planned when they are asked for."""
+        if self._stale:
+            self.replan()
+        return self._q
+
+    @property
+    def indifferent(self) -> NDArray[np.float32]:
+        """A table to play that leaves every action to chance."""
+        return np.zeros_like(self._q)
 
     def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Play some episodes, with a new plan after each; see `tickwise.rl.learner.Learner`."""
@@ -121,7 +133,7 @@ class ModelLearner:
         paths = np.empty((episodes, self.problem.task.horizon + 1), np.int32)
         for episode in range(episodes):
             returns[episode : episode + 1], paths[episode : episode + 1] = self.play(rng)
-            self.replan()
+            self._stale = True
         return returns, paths
 
     def play(
@@ -140,8 +152,10 @@ class ModelLearner:
             ConfigurationError: If the table has another shape.
         """
         table = self.q if q is None else q
-        if table.shape != self.q.shape:
-            raise ConfigurationError(f"the table to play has shape {table.shape}; use that of the plan, {self.q.shape}")
+        if table.shape != self._q.shape:
+            raise ConfigurationError(
+                f"the table to play has shape {table.shape}; use that of the plan, {self._q.shape}"
+            )
         paths = np.empty((1, self.problem.task.horizon + 1), np.int32)
         stream = take_stream(rng)
         arguments: tuple[Any, ...] = (
@@ -151,8 +165,33 @@ class ModelLearner:
         put_back(rng, stream)
         return np.array([total], np.float32), paths
 
+    def recount(self, paths: NDArray[np.int32]) -> None:
+        """Count rewards and ends by what this memory's automaton says, from episodes that were had with another.
+
+        Args:
+            paths: The MDP states of all episodes so far, -1 after their end, shape ``(episodes, horizon + 1)``.
+        """
+        problem, memory, counts = self.problem, self.problem.memory, self.counts
+        rewards, ended = problem.replayed(paths)
+        horizon, rows = problem.task.horizon, np.arange(len(paths))
+        read = np.zeros(problem.mdp.n_states, np.int32)  # an automaton's letter is that of the state arrived in
+        read[problem.mdp.successor] = memory.letter
+        u, last = memory.start[paths[:, 0]], (paths >= 0).sum(axis=1) - 1
+        for part in (counts.rewards, counts.arrivals, counts.ends):
+            part[:] = 0
+        for t in range(1, horizon + 1):
+            rows = rows[paths[rows, t] >= 0]
+            s = paths[rows, t]
+            u[rows] = memory.delta[u[rows], read[s]]
+            kinds = 2 * (self.unrolled.verdict[u[rows]] + 1) + (t == horizon)
+            np.add.at(counts.rewards, (kinds, s), rewards[rows, t - 1])
+            np.add.at(counts.arrivals, (kinds, s), 1)
+            np.add.at(counts.ends, (kinds, s), (last[rows] == t) & (ended[rows] | (t == horizon)))
+        self._stale = True
+
     def replan(self) -> None:
         """Plan for the rewards on what was counted so far."""
+        self._stale = False
         reward, ends = expectations(self.counts, self.settings)
         left = self.problem.task.horizon - self.unrolled.tick
         # where a formula is decided by the end, "unknown at the last tick" is never seen, and would be hoped for always
@@ -160,7 +199,7 @@ class ModelLearner:
         best = np.zeros(CLASSES)
         best[occurring] = np.maximum(reward[occurring].max(axis=1), 0.0)
         worth = np.maximum(left - 1, 0) * best[::2].max() + best[1::2].max()
-        sweep(self.problem, self.unrolled, self.counts, self.settings.known, reward, ends, worth, self.given, self.q)
+        sweep(self.problem, self.unrolled, self.counts, self.settings.known, reward, ends, worth, self.given, self._q)
 
 
 def expectations(counts: Counts, settings: ModelBased) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -210,7 +249,7 @@ def satisfying_plan(learner: ModelLearner) -> NDArray[np.float32]:
         follows.
     """
     problem, unrolled = learner.problem, learner.unrolled
-    q = np.zeros_like(learner.q)
+    q = np.zeros((problem.memory.n_states, problem.mdp.n_states, problem.mdp.n_actions), np.float32)
     reward = np.zeros((CLASSES, problem.mdp.n_states))
     reward[[3, 5]] = 1.0  # unknown or true at the last tick
     hope, nothing = np.where(unrolled.verdict < 0, 0.0, 1.0), np.empty((0, 1, 1), np.float32)
@@ -219,7 +258,11 @@ def satisfying_plan(learner: ModelLearner) -> NDArray[np.float32]:
 
 
 def imagined(
-    learner: ModelLearner, starts: NDArray[np.int32], episodes: int, rng: np.random.Generator
+    learner: ModelLearner,
+    starts: NDArray[np.int32],
+    episodes: int,
+    rng: np.random.Generator,
+    q: NDArray[np.float32] | None = None,
 ) -> NDArray[np.int32]:
     """Episodes of the plan in the world as far as it was met; see `tickwise.rl.planning.imagine`.
 
@@ -228,6 +271,7 @@ def imagined(
         starts: MDP states, one of which is drawn at the beginning of each episode, shape ``(n,)``.
         episodes: How many.
         rng: The generator that all draws come from.
+        q: The table to play, of the plan's shape; None for the plan.
 
     Returns:
         MDP states, shape ``(episodes, horizon + 1)``.
@@ -243,6 +287,6 @@ def imagined(
     paths = np.empty((episodes, problem.task.horizon + 1), np.int32)
     stream = take_stream(rng)
     arrays = (problem.mdp.successor, memory.start, memory.delta, memory.letter)
-    imagine(starts, *arrays, learner.counts.outcomes, stream, learner.q, paths)
+    imagine(starts, *arrays, learner.counts.outcomes, stream, learner.q if q is None else q, paths)
     put_back(rng, stream)
     return paths

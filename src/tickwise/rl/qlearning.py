@@ -78,13 +78,29 @@ class Problem:
         Returns:
             Shape ``(episodes,)``.
         """
+        return self.replayed(paths)[1]
+
+    def replayed(self, paths: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """What an agent was told at each step of some episodes.
+
+        Args:
+            paths: MDP states of each episode, -1 after its end, shape ``(episodes, horizon + 1)``.
+
+        Returns:
+            The rewards, 0 after the end, shape ``(episodes, horizon)``; and whether the task ended the episode, shape
+            ``(episodes,)``.
+        """
         task = self.task
         w = task.delta[0, task.letter[paths[:, 0]]]
+        rewards = np.zeros((len(paths), task.horizon))
         ended = np.zeros(len(paths), dtype=np.bool_)
-        for s in paths[:, 1:].T:
-            w = np.where(s >= 0, task.delta[w, task.letter[s]], w)
-            ended |= (s >= 0) & task.terminated[w]
-        return ended
+        for t in range(1, task.horizon + 1):
+            rows = np.flatnonzero(paths[:, t] >= 0)
+            s = paths[rows, t]
+            w[rows] = task.delta[w[rows], task.letter[s]]
+            rewards[rows, t - 1] = task.reward[w[rows], s] + (task.final_reward[w[rows]] if t == task.horizon else 0.0)
+            ended[rows] |= task.terminated[w[rows]]
+        return rewards, ended
 
     def initial_q(self, settings: QSettings) -> NDArray[np.float32]:
         """A fresh Q-table at the settings' initial value, shape ``(memory states, states, actions)``."""

@@ -25,7 +25,6 @@ from tickwise.inference.tree import InferenceSettings
 from tickwise.logic.sdnf import SDNF
 from tickwise.rl.learner import Learner, LearningForm
 from tickwise.rl.model import ModelBased, ModelLearner, imagined, no_counts, satisfying_plan
-from tickwise.rl.planning import Counts
 from tickwise.rl.qlearning import Problem
 from tickwise.rl.states import DisjunctChoice, automaton_memory, nearest_centroid
 from tickwise.transfer.episodes import Episodes, Good
@@ -145,7 +144,7 @@ class ClosedLoop:
         self.target, self.settings, self.rng = target, settings, rng
         self.episodes = Episodes(target.problem, target.is_good)
         self.hypotheses = Hypotheses(source, target.space, target.prior, settings.hypotheses, rng)
-        self.counts: Counts = no_counts(target.problem.mdp)
+        self.outcomes = no_counts(target.problem.mdp).outcomes
         self.attempts: list[Attempt] = []
         self.collected: int | None = None
         self.transferable, self.reason = True, ""
@@ -180,9 +179,10 @@ class ClosedLoop:
         """One episode that puts as many hypotheses as can be to the test; after a batch of them, a selection."""
         if rng.random() < self.settings.random:
             plan = self._model(self.hypotheses.source)
-            played = plan.play(rng, np.zeros_like(plan.q))
+            played = plan.play(rng, plan.indifferent)
         else:
-            played = self._most_probable().play(rng)
+            plan, table = self._most_probable()
+            played = plan.play(rng, table)
         self.episodes.add(*played)
         self._explored += 1
         if self._explored % self.settings.batch == 0:
@@ -190,27 +190,42 @@ class ClosedLoop:
             self._infer()
         return played
 
-    def _most_probable(self) -> ModelLearner:
-        """The plan to satisfy a hypothesis whose imagined episodes most of the hypotheses accept."""
+    def _most_probable(self) -> tuple[ModelLearner, NDArray[np.float32]]:
+        """The plan to satisfy a hypothesis, and its table, whose imagined episodes most of the hypotheses accept."""
         best = self.hypotheses.best
-        plans = [self._model(formula) for formula in self._some(best, self.settings.candidates)]
-        for plan in plans:
-            plan.q[:] = satisfying_plan(plan)
-        return max(plans, key=lambda plan: self._mass(plan, best, self.settings.imagined))
+        found = []
+        for formula in self._some(best, self.settings.candidates):
+            plan = self._model(formula)
+            table = satisfying_plan(plan)
+            found.append((self._mass(plan, best, self.settings.imagined, table), plan, table))
+        return max(found, key=lambda each: each[0])[1:]
 
     def _some(self, best: NDArray[np.float64], most: int) -> list[SDNF]:
         rows = self.rng.choice(len(best), min(most, len(best)), replace=False)
         return [self.hypotheses.formula(best[row]) for row in rows]
 
-    def _mass(self, plan: ModelLearner, among: NDArray[np.float64], episodes: int) -> float:
+    def _mass(
+        self,
+        plan: ModelLearner,
+        among: NDArray[np.float64],
+        episodes: int,
+        table: NDArray[np.float32] | None = None,
+    ) -> float:
         """The share of hypotheses that accept an imagined episode of a plan: how probably it is good."""
-        paths = imagined(plan, self.episodes.starts, episodes, self.rng)
+        paths = imagined(plan, self.episodes.starts, episodes, self.rng, table)
         return self.hypotheses.mass(self.episodes.trajectories(paths, np.ones(len(paths), np.int8)), among)
 
     def _model(self, formula: SDNF) -> ModelLearner:
-        """Plans on the world as far as it was met, with a formula's automaton."""
+        """Plans on the world as far as it was met, with a formula's automaton; its rewards are not counted yet."""
         form = self.settings.form if isinstance(self.settings.form, ModelBased) else ModelBased()
-        return form.learner(self.target.extended(formula), counts=self.counts)
+        counts = no_counts(self.target.problem.mdp)._replace(outcomes=self.outcomes)
+        return form.learner(self.target.extended(formula), counts=counts)
+
+    def _rewarded(self, formula: SDNF) -> ModelLearner:
+        """The same with all rewards so far."""
+        model = self._model(formula)
+        model.recount(self.episodes.paths)
+        return model
 
     # inferring
 
@@ -269,7 +284,7 @@ class ClosedLoop:
         """Of the hypotheses that agree best, the one whose plan for the rewards most of them accept."""
         best = self.hypotheses.best
         masses = {
-            formula: self._mass(self._model(formula), best, 4 * self.settings.imagined)
+            formula: self._mass(self._rewarded(formula), best, 4 * self.settings.imagined)
             for formula in self._some(best, 4 * self.settings.candidates)
         }
         return max(masses, key=masses.__getitem__)
@@ -295,7 +310,7 @@ class ClosedLoop:
         """Go on with a formula, with what was learned on the one before."""
         problem, form, before = self.target.extended(formula), self.settings.form, self._learner
         if isinstance(form, ModelBased):
-            self._learner = form.learner(problem, counts=self.counts)
+            self._learner = self._rewarded(formula)
         elif self._acting is None and not self.attempts:
             self._learner = form.learner(problem)
         else:
