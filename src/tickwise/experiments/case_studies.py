@@ -65,6 +65,7 @@ CASE_STUDY_2 = StudySpec(
     learning=Learning(
         settings=QSettings(epsilon=0.005, initial=50.0),
         source=QSettings(epsilon=0.1, initial=50.0),
+        most_episodes={**Learning().most_episodes, "V": 1_000},
         goal=Goal(block=1, above=1_000.0),
         window=7_000,
     ),
