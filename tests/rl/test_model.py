@@ -170,17 +170,18 @@ def test_counts_go_on_in_another_learner():
 
 
 def test_a_plan_to_satisfy_takes_the_weak_view_and_what_is_unknown_for_good():
-    problem = a_problem("F[1,4] (x >= 1)")
+    problem = a_problem("F[1,2] (x >= 1) & F[3,4] (x >= 0)")
     learner = ModelBased().learner(problem)
     violated = learner.unrolled.verdict < 0
     last = learner.unrolled.tick == problem.task.horizon
     q = satisfying_plan(learner)
     assert (q[~violated & ~last] == 1.0).all()
     assert (q[violated] == 0.0).all()
+    assert (violated & ~last).any()
     learner.counts.outcomes[:] = 1
     start = learner.problem.memory.start[0]
-    assert satisfying_plan(learner)[start, 0] == pytest.approx([15 / 16] * 2)
-    short = ModelBased().learner(replace(problem, task=replace(problem.task, horizon=2)), counts=learner.counts)
+    assert satisfying_plan(learner)[start, 0] == pytest.approx([3 / 4] * 2)
+    short = ModelBased().learner(replace(problem, task=replace(problem.task, horizon=1)), counts=learner.counts)
     assert satisfying_plan(short)[start, 0] == pytest.approx([1.0, 1.0])
 
 
