@@ -23,6 +23,7 @@ from tickwise.inference.prior import Prior
 from tickwise.inference.space import SearchSpace
 from tickwise.inference.tree import InferenceSettings
 from tickwise.logic.sdnf import SDNF
+from tickwise.logic.structure import structurally_transferable
 from tickwise.rl.learner import Learner, LearningForm
 from tickwise.rl.model import ModelBased, ModelLearner, imagined, no_counts, satisfying_plan
 from tickwise.rl.qlearning import Problem
@@ -34,6 +35,8 @@ from tickwise.transfer.qtransfer import transfer_q
 _FAILURES = 3  # selections without a satisfying formula, one after the other, before another copy is tried
 _MARGIN = 0.02  # by how much another formula has to promise more, as a probability, to be tried
 _TRIES = 6  # formulas that are tried because they promise more
+_NODES = 10_000  # of an exact search; a limit of time would make results depend on the machine
+_TIE = 1e-9  # 1 - 0.9 is a little less than 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +173,12 @@ class ClosedLoop:
 
     def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Go on for some episodes; see `tickwise.rl.learner.Learner`."""
-        parts = [self._explore(rng) if self._acting is None else self._act(rng) for _ in range(episodes)]
-        return np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+        returns = np.empty(episodes, np.float32)
+        paths = np.empty((episodes, self.target.problem.task.horizon + 1), np.int32)
+        for episode in range(episodes):
+            played = self._explore(rng) if self._acting is None else self._act(rng)
+            returns[episode], paths[episode] = played[0][0], played[1][0]
+        return returns, paths
 
     # collecting
 
@@ -246,7 +253,7 @@ class ClosedLoop:
 
     @property
     def _satisfying(self) -> bool:
-        return bool(self.hypotheses.errors.min() <= 1 - self.target.settings.rate)
+        return bool(self.hypotheses.errors.min() <= 1 - self.target.settings.rate + _TIE)
 
     def _grow(self, good: int) -> None:
         """One more copy of the structure, or the end of the supposition that it is the source's."""
@@ -257,20 +264,25 @@ class ClosedLoop:
             hypotheses.update(data, weights, 3 * self.settings.rounds)
             if not self._satisfying:
                 hypotheses.copies, hypotheses.positions, hypotheses.errors = before
-        if not self._satisfying and self.transferable and good >= self.settings.patience:
-            self._give_up()
+        if not self._satisfying and good >= self.settings.patience:
+            if self.transferable:
+                self._give_up()
+            self._start_over()
 
     def _give_up(self) -> None:
-        """Go on without the source: its structure does not say the target's rule."""
-        rate, settings = 1 - float(self.hypotheses.errors.min()), self.target.settings
+        """The source's structure does not say the target's rule."""
+        rate, least = 1 - float(self.hypotheses.errors.min()), self.target.settings.rate
         self.transferable = False
         self.reason = (
             f"Logical transferability is not identified: the best formula of the source's structure judges {rate:.1%} "
-            f"of the target's episodes rightly, below the {settings.rate:.1%} that are asked for."
+            f"of the target's episodes rightly, below the {least:.1%} that are asked for."
         )
+
+    def _start_over(self) -> None:
+        """Go on without the source, from a formula of any structure; again whenever that structure fails as well."""
         data, _ = self.episodes.labelled(prefixes=False)
-        limits = ExactSettings(joint=True, seconds=2.0)
-        balanced = replace(settings, class_weight="balanced")
+        limits = ExactSettings(joint=True, nodes=_NODES)
+        balanced = replace(self.target.settings, class_weight="balanced")
         try:
             fit = infer_jointly(data, self.target.prior, self.target.space, balanced, limits)
         except DataError:  # nothing tells them apart; more episodes may
@@ -311,8 +323,8 @@ class ClosedLoop:
         problem, form, before = self.target.extended(formula), self.settings.form, self._learner
         if isinstance(form, ModelBased):
             self._learner = self._rewarded(formula)
-        elif self._acting is None and not self.attempts:
-            self._learner = form.learner(problem)
+        elif not (self.attempts and structurally_transferable(formula, self.attempts[-1].formula)):
+            self._learner = form.learner(problem)  # nothing was learned that ξ could take along
         else:
             mdp, fallback = problem.mdp, float(np.median(before.q))
             q = transfer_q(mdp, before.problem.memory, before.q, mdp, problem.memory, fallback)
@@ -333,7 +345,7 @@ class ClosedLoop:
         attempt.episodes, attempt.good = attempt.episodes + 1, attempt.good + good
         attempt.wrong += not right
         fresh = self.settings.fresh
-        if self._judged.count(False) > (1 - self.target.settings.rate) * fresh:
+        if self._judged.count(False) > (1 - self.target.settings.rate + _TIE) * fresh:
             self._refute()
         elif attempt.episodes % fresh == 0:
             self._review(attempt)
