@@ -11,7 +11,7 @@ from tickwise._seeding import generator, seed_sequence
 from tickwise.envs.planning import optimal_value
 from tickwise.errors import ConfigurationError
 from tickwise.experiments.artefacts import Artefacts
-from tickwise.experiments.inferences import search_space, study_formulas, uniform_prior
+from tickwise.experiments.inferences import satisfying_source, search_space, uniform_prior
 from tickwise.experiments.job import Job, Outcome, Report
 from tickwise.experiments.measures import block_means, goal_reached
 from tickwise.experiments.study import StudySpec
@@ -25,7 +25,7 @@ def learn_in_closed_loop(job: Job, spec: StudySpec, store: Artefacts, report: Re
     """Collect, infer and learn in the target task at once; every episode in it counts.
 
     Raises:
-        ConfigurationError: If no formula of the source task was inferred.
+        ConfigurationError: If no satisfying formula of the source task was inferred.
     """
     learning = spec.learning
     loop = closed_loop(spec, store, job.run)
@@ -61,9 +61,9 @@ def closed_loop(spec: StudySpec, store: Artefacts, run: int) -> ClosedLoop:
     Raises:
         ConfigurationError: If no formula of the source task was inferred.
     """
-    source = study_formulas(spec, store)["source"]
+    source = satisfying_source(spec, store)
     if source is None:
-        raise ConfigurationError("V needs the source's formula, and none was inferred; leave it out")
+        raise ConfigurationError("V needs a satisfying formula of the source, and none was inferred; leave it out")
     environment = spec.target
     mdp = environment.mdp()
     target = Target(

@@ -193,3 +193,9 @@ def study_formulas(spec: StudySpec, store: Artefacts) -> dict[str, SDNF | None]:
         "target_without_information": plain["formula"] if plain and plain["satisfying"] else None,
     }
     return {name: None if text is None else to_sdnf(parse(text)) for name, text in texts.items()}
+
+
+def satisfying_source(spec: StudySpec, store: Artefacts) -> SDNF | None:
+    """φ^S, if it is a satisfying formula of the source task (Problem 1), so that its structure is worth looking for."""
+    satisfying = store.load(formulas_job(spec).name)["source"]["satisfying"]
+    return study_formulas(spec, store)["source"] if satisfying else None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tickwise.experiments.executors import Executor, Local, Run, Task, interruptible
-from tickwise.experiments.inferences import study_formulas
+from tickwise.experiments.inferences import satisfying_source, study_formulas
 from tickwise.experiments.job import Job, inference_job
 from tickwise.experiments.progress import Display, Item, board
 from tickwise.experiments.store import Store
@@ -95,9 +95,9 @@ def run_units(units: Sequence[Unit], workers: int | Executor, display: Display) 
 def available_methods(spec: StudySpec, store: Store) -> tuple[str, ...]:
     """The methods that can run once the formulas are inferred, and that the specification has episodes for.
 
-    Method I needs no formula; II needs φ'^T, III and IV need φ^T, and so logical transferability; V needs φ^S alone.
+    Method I needs no formula; II needs φ'^T, III and IV need φ^T, and so logical transferability; V needs φ^S alone, if it is satisfying.
     """
-    formulas = study_formulas(spec, store)
+    formulas = {**study_formulas(spec, store), "source": satisfying_source(spec, store)}
     needed = {"II": "target_without_information", "III": "target", "IV": "target", "V": "source"}
     return tuple(
         method for method in spec.learning.most_episodes if method not in needed or formulas[needed[method]] is not None
