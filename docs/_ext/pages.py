@@ -25,7 +25,15 @@ from tickwise.cli import main
 from tickwise.cli.app import output
 
 DOCS = Path(__file__).parents[1]
-PAGES = ("tutorial", "concepts", "how-to/add-a-case-study", "how-to/library", "how-to/many-seeds", "how-to/other-tools")
+PAGES = (
+    "tutorial",
+    "concepts",
+    "how-to/add-a-case-study",
+    "how-to/forms",
+    "how-to/library",
+    "how-to/many-seeds",
+    "how-to/other-tools",
+)
 """The pages whose blocks are run, each in a folder of its own."""
 
 FIGURES = {"curves.svg": "tutorial-curves.svg"}
