@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError
 from tickwise.inference.kernels import EVENTUALLY_ALWAYS, Shape
-from tickwise.inference.objective import Objective
+from tickwise.inference.objective import Objective, formula_signature
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import Gaps, SearchSpace, shape_of
 from tickwise.inference.starts import sampled_starts
@@ -106,6 +106,9 @@ class Hypotheses:
     def grow(self, data: LabelledTrajectories, weights: NDArray[np.float64]) -> None:
         """Go on with one more copy of the structure, put together from conjunctions that let no negative through.
 
+        Half of them, for two copies, are those that say most of the positives, and half those that say most of what the
+        best of these leaves; and so on for more copies. Those that say most are otherwise all much the same.
+
         Raises:
             DataError: If a label is missing.
         """
@@ -113,16 +116,22 @@ class Hypotheses:
         width = self.positions.shape[1] // self.copies
         single = [self.positions[:, i * width : (i + 1) * width] for i in range(self.copies)]
         alone = structure_shape(self.source)
-        pool = np.concatenate([*single, sampled_starts(data, self.space, alone, 4 * self._kept(data), self.rng)])
-        accepted = Objective(data, weights * (data.labels < 0), self.prior, self.space, alone, self._gaps, 0.0)
-        covered = Objective(data, weights * (data.labels > 0), self.prior, self.space, alone, self._gaps, 0.0)
-        lowest = np.full(len(pool), -np.inf)
-        order = np.lexsort((-covered(pool, lowest), np.round(-accepted(pool, lowest), 2)))
-        pure = pool[order[:_PURE]]
+        pool = np.concatenate([*single, sampled_starts(data, self.space, alone, 4 * self.count, self.rng)])
+
+        def right(members: NDArray[np.bool_]) -> NDArray[np.float64]:
+            objective = Objective(data, weights * members, self.prior, self.space, alone, self._gaps, 0.0)
+            return objective(pool, np.full(len(pool), -np.inf))
+
+        pure, left = np.round(right(data.labels < 0), 2), data.labels > 0
         self.copies += 1
-        count = 4 * self._kept(data)
-        picked = self.rng.integers(len(pure), size=(count, self.copies))
-        self._select(pure[picked].reshape(count, -1), data, weights)
+        chosen: list[NDArray[np.float64]] = []
+        while left.any() and len(chosen) < self.copies:
+            order = np.lexsort((-right(left), -pure))
+            chosen.append(pool[order[: _PURE // self.copies]])
+            left = left & ~formula_signature(self.space.decode(chosen[-1][0], alone), data)
+        parts = np.concatenate(chosen)
+        picked = self.rng.integers(len(parts), size=(4 * self.count, self.copies))
+        self._select(parts[picked].reshape(4 * self.count, -1), data, weights)
 
     def mass(self, trajectories: LabelledTrajectories, among: NDArray[np.float64]) -> float:
         """The mean share of some formulas that trajectories satisfy: the probability that they are good.
