@@ -55,11 +55,8 @@ STAY = Case("F[0,4] G[0,3] (x <= 1 & y <= 1)", FormulaTask("F[0,6] G[0,2] (x >= 
 EITHER = Case("F[0,5] (2 <= x <= 3 & y >= 2)", FormulaTask("F[0,6] (x >= 3 & y >= 3) | F[0,6] (x <= 1 & y <= 1)", 7))
 """Two copies of the source's structure."""
 
-VISITS = Case(
-    "F[2,5] (x >= 1 & y >= 2)", FormulaTask("G[0,6] F[0,3] (1 <= x <= 2 & y >= 1)", 9, ends="violated"), size=3
-)
-"""The source's structure cannot say it."""
-
+ERRAND = Case("F[2,5] (x >= 1 & y >= 2)", FormulaTask("F[0,4] (x <= 1) & F[5,8] (x >= 2)", 8), size=3)
+"""No copies of the source's structure say that there are two things to do."""
 
 SEVERAL = Case(
     "F[0,4] G[0,1] (x <= 1 & y <= 1) | F[2,6] (x >= 3 & y >= 3)",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.transfer.loops import CASES, EITHER, KEEP, QUICK, STAY, VISITS, Case, sdnf, share_of_the_optimum
+from tests.transfer.loops import CASES, EITHER, ERRAND, KEEP, QUICK, STAY, Case, sdnf, share_of_the_optimum
 from tickwise.envs.temporal import FormulaTask
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.inference.fit import Fit
@@ -79,7 +79,8 @@ def test_a_satisfying_formula_is_found_and_the_optimum_is_near(name: str):
     data, weights = loop.episodes.labelled()
     right = formula_signature(loop.formula, data) == (data.labels == 1)
     assert weights[right].sum() >= 0.95 * weights.sum()
-    assert share_of_the_optimum(loop) > (0.9 if name == "keep" else 0.95)
+    # the rule that has to be kept for long takes more episodes, since slips are rare
+    assert share_of_the_optimum(loop) > (0.85 if name == "keep" else 0.95)
     assert len(loop.problem.memory.start) == loop.problem.mdp.n_states
     assert loop.q.shape == (loop.problem.memory.n_states, loop.problem.mdp.n_states, 3)
 
@@ -93,9 +94,9 @@ def test_copies_are_joined_where_one_does_not_do():
 
 
 def test_a_structure_that_cannot_say_it_is_not_transferable():
-    loop = VISITS.loop(patience=15)
+    loop = ERRAND.loop(patience=15)
     rng = np.random.default_rng(100)
-    while loop.transferable:
+    while loop.transferable and len(loop.episodes) < 230:
         assert loop.reason == ""
         loop.learn(rng, 1)
     assert 15 <= loop.episodes.good.sum() < 60
@@ -103,17 +104,17 @@ def test_a_structure_that_cannot_say_it_is_not_transferable():
     assert loop.reason.endswith("rightly, below the 95.0% that are asked for.")
     reason = loop.reason
     # it goes on without the source
-    loop.learn(rng, 250 - len(loop.episodes))
+    loop.learn(rng, 300 - len(loop.episodes))
     check_books(loop)
     assert not loop.transferable
     assert loop.reason == reason
     assert loop.formula is not None
-    assert not structurally_transferable(loop.formula, sdnf(VISITS.source))
+    assert not structurally_transferable(loop.formula, sdnf(ERRAND.source))
     assert share_of_the_optimum(loop) > 0.95
 
 
 def test_what_nothing_was_found_for_is_tried_again(monkeypatch: pytest.MonkeyPatch):
-    loop = VISITS.loop(patience=15)
+    loop = ERRAND.loop(patience=15)
     tried: list[int] = []
     found: list[Fit] = []
 
@@ -138,7 +139,7 @@ def test_what_nothing_was_found_for_is_tried_again(monkeypatch: pytest.MonkeyPat
     assert loop.hypotheses.errors[0] <= weights[wrong].sum() / weights.sum() + 1e-9
 
 
-@pytest.mark.parametrize(("case", "form"), [(STAY, ModelBased()), (STAY, QLearning()), (VISITS, QLearning())])
+@pytest.mark.parametrize(("case", "form"), [(STAY, ModelBased()), (STAY, QLearning()), (ERRAND, QLearning())])
 def test_learning_in_two_parts_is_learning_at_once(case: Case, form: LearningForm):
     once, twice = (case.loop(3, form=form, patience=15) for _ in range(2))
     rngs = [np.random.default_rng(4) for _ in range(2)]
@@ -235,7 +236,7 @@ def test_values_go_from_one_formula_to_the_next():
 @pytest.mark.parametrize("name", FORMS)
 def test_all_forms_learn(name: str):
     form: Any = FORMS[name]()
-    for case in (STAY, VISITS):
+    for case in (STAY, ERRAND):
         loop = case.loop(form=form, patience=15)
         loop.learn(np.random.default_rng(0), 150)
         check_books(loop)
@@ -287,8 +288,8 @@ def test_random_episodes_alone():
     loop.learn(np.random.default_rng(0), 60)
     assert loop.attempts == []
     # tied actions are drawn, so the world is met nearly everywhere
-    assert loop.counts.outcomes.sum() == 600
-    assert (loop.counts.outcomes.sum(axis=2) > 0).mean() > 0.9
+    assert loop.outcomes.sum() == 600
+    assert (loop.outcomes.sum(axis=2) > 0).mean() > 0.9
 
 
 @pytest.mark.parametrize(
