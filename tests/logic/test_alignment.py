@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tickwise.errors import FormulaError
-from tickwise.logic.alignment import Alignment, align, aligned
+from tickwise.logic.alignment import Alignment, align, aligned, carried
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import to_sdnf
 from tickwise.logic.structure import structurally_equivalent
@@ -35,7 +35,7 @@ def test_the_sources_disjuncts_are_taken_again():
 
 
 def test_other_structures_are_refused_in_one_line():
-    for function in (align, aligned):
+    for function in (align, aligned, carried):
         with pytest.raises(FormulaError, match="not structurally transferable") as caught:
             function(parse("F[1,5] (x >= 1)"), parse("G[1,5] (x >= 1)"))
         assert "\n" not in str(caught.value)
@@ -49,6 +49,16 @@ def test_a_source_laid_over_its_target_by_hand():
     assert str(aligned(parse(source), parse(target))) == str(to_sdnf(parse(moved)))
     # sides that are open in one only say nothing of the displacement
     assert str(aligned(parse("F[1,5] (x >= 1)"), parse("F[2,5] (x <= 3)"))) == "F[1,5] (x >= 1)"
+
+
+def test_a_source_carried_over_by_hand():
+    source = "F[1,5] G[0,2] (1 <= x <= 2 & 0 <= y <= 4) & F[9,12] !(3 <= x <= 5)"
+    target = "F[3,7] G[0,3] (4 <= x <= 6 & 1 <= y <= 4) & F[11,15] !(8 <= x <= 10)"
+    # the first centroid is (1.5, 2) and is to be (5, 2.5), the second is 4 and is to be 9
+    there = "F[1,5] G[0,2] (4.5 <= x <= 5.5 & 0.5 <= y <= 4.5) & F[9,12] !(8 <= x <= 10)"
+    assert str(carried(parse(source), parse(target))) == str(to_sdnf(parse(there)))
+    assert str(carried(parse("F[1,5] (x >= 1)"), parse("F[2,5] (x >= 3)"))) == "F[1,5] (x >= 3)"
+    assert str(carried(parse("F[1,5] (x >= 1)"), parse("F[2,5] (x <= 3)"))) == "F[1,5] (x >= 1)"
 
 
 def test_no_window_is_moved_before_the_beginning():
@@ -94,6 +104,7 @@ def test_a_displaced_formula_is_no_other(sides: list[int], start: int, duration:
     plain, displaced = made(sides, start, duration), made(sides, start, duration, shift, delay)
     assert align(plain, displaced) == Alignment({"x": shift}, delay, {"x": 0}, 0)
     assert aligned(plain, displaced) == to_sdnf(displaced)
+    assert carried(plain, displaced) == to_sdnf(made(sides, start, duration, shift))
 
 
 @given(formulas(), formulas())

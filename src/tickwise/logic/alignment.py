@@ -82,6 +82,34 @@ def aligned(source: Formula | SDNF, target: Formula | SDNF) -> SDNF:
     return SDNF(tuple(_laid_over(pairs) for pairs in _pairs(source, target)))
 
 
+def carried(source: Formula | SDNF, target: Formula | SDNF) -> SDNF:
+    """A source's formula as Algorithm 2 carries it over: each region about the centroid of the target's, times kept.
+
+    It is roughly what the greedy policy of transferred values aims at. Algorithm 2 compares states relative to the
+    region of the primitive that is due, so that each region is displaced for itself, and takes clocks as they are, so
+    that no window is. A side that is open, in either formula, has no part in a displacement.
+
+    Args:
+        source: A formula that can be brought to SDNF, or an SDNF.
+        target: Another one, structurally transferable from it.
+
+    Returns:
+        The formula with its regions displaced, structurally equivalent to the target.
+
+    Raises:
+        FormulaError: If the target is not structurally transferable from the source.
+    """
+    return SDNF(tuple(SequentialConjunction(tuple(map(_recentred, pairs))) for pairs in _pairs(source, target)))
+
+
+def _recentred(pair: tuple[Primitive, Primitive]) -> Primitive:
+    shifts = {
+        variable: fmean([*filter(math.isfinite, differences)] or [0.0])
+        for variable, differences in _distances([pair]).items()
+    }
+    return _moved(pair[0], shifts, 0)
+
+
 _Pairs = Sequence[tuple[Primitive, Primitive]]
 
 
