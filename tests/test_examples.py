@@ -2,6 +2,7 @@
 
 import importlib
 import itertools
+import json
 import math
 import subprocess
 import sys
@@ -15,6 +16,9 @@ import numpy as np
 import pytest
 
 from tickwise.inference.reading import read_trajectories
+from tickwise.logic.parse import parse
+from tickwise.logic.sdnf import to_sdnf
+from tickwise.logic.structure import structurally_equivalent
 
 ROOT = Path(__file__).parents[1]
 NAVAL = ROOT.parent / "shared" / "data" / "naval" / "naval.npz"
@@ -177,3 +181,65 @@ def test_deep_agents_are_compared(
         "state", "extended state", "extended state, transferred values",
     ]  # fmt: skip
     assert (tmp_path / f"{algorithm}.png").stat().st_size > 10_000
+
+
+# what predicts transfer
+
+
+def test_choices_that_tie_share_and_good_ones_are_near_the_best(example: Example):
+    ranking = example("ranking")
+    chosen = ranking.choices(np.array([[1.0, 3.0, 3.0], [2.0, 1.0, 0.0]]))
+    assert chosen.tolist() == [[0, 0.5, 0.5], [1, 0, 0]]
+    # 240 is just near enough to 200, 300 is not
+    assert ranking.good(chosen, np.array([[300.0, 200.0, 300.0], [240.0, 300.0, 200.0]])).tolist() == [0.5, 1]
+
+
+def test_statistics_of_rankings_by_hand(example: Example):
+    ranking = example("ranking")
+    assert ranking.correlation(np.array([1.0, 2.0, 9.0]), np.array([3.0, 5.0, 6.0])) == pytest.approx(1)
+    assert ranking.correlation(np.array([1.0, 2.0, 3.0]), np.array([2.0, 3.0, 1.0])) == pytest.approx(-0.5)
+    rows = np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 5.0]])
+    # of the other row the ranks are 1.5, 1.5 and 3
+    assert ranking.correlation(rows, np.array([[2.0, 3.0, 1.0], [4.0, 2.0, 6.0]])) == pytest.approx([0, 3**0.5 / 2])
+    # the textbook's interval of 8 in 10
+    assert ranking.wilson(0.8, 10) == pytest.approx((0.4902, 0.9433), abs=1e-4)
+    assert ranking.geometric(np.array([1.0, 4.0, 16.0])) == pytest.approx(4)
+    runs = np.array([[[100] * 4, [500] * 4]])
+    assert ranking.ceiling(runs) == 1  # without noise
+
+
+def test_a_group_of_random_tasks_is_measured_once(
+    example: Example, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    similarity = example("similarity")
+    short = partial(
+        similarity.Plan, sources=2, source_episodes=3_000, walks=(500,), rehearsals=1, goal=similarity.Goal(most=1_000)
+    )
+    small = replace(similarity.TASKS, sizes=(4, 5), deadlines=(14, 16), windows=(3, 6), durations=(2, 3))
+    monkeypatch.setattr(similarity, "Plan", short)
+    monkeypatch.setattr(similarity, "TASKS", small)
+    arguments = ["--groups", "1", "--runs", "2", "--out", str(tmp_path), "--workers", "1"]
+    monkeypatch.setattr(sys, "argv", ["similarity", *arguments])
+    similarity.main()
+    shown = capsys.readouterr()
+    assert shown.err.startswith("1 of 1 groups")
+    assert "2 pairs in 1 groups" in shown.out
+    found = json.loads((tmp_path / "groups" / "000.json").read_text())
+    target, *sources = (parse(each["formula"]) for each in (found["target"], *found["sources"]))
+    assert len(sources) == 2
+    for source in sources:
+        assert structurally_equivalent(to_sdnf(source), to_sdnf(target))
+    for source in found["sources"]:
+        assert len(source["episodes"]) == 2
+        assert all(0 <= source["predictors"][f"promise, {model}"] <= 1 for model in ("500 walks", "true model"))
+    for name in ("similarity.png", "choices.png"):
+        assert (tmp_path / name).stat().st_size > 10_000
+    # what is there is not measured again, and nothing changes
+    monkeypatch.setattr(similarity, "measured", None)
+    before = (tmp_path / "summary.json").read_bytes()
+    similarity.main()
+    assert (tmp_path / "summary.json").read_bytes() == before
+    # but by another plan it would be
+    monkeypatch.setattr(sys, "argv", ["similarity", *arguments, "--seed", "1"])
+    with pytest.raises(TypeError):
+        similarity.main()
