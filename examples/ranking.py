@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from scipy.stats import norm, rankdata
 
 from tickwise.experiments.figures.style import BLUE, MUTED, STYLE, VERMILION, canvas
+from tickwise.logic.alignment import align
+from tickwise.logic.parse import parse
 
 Group = dict[str, Any]
 """A target with its sources, as `similarity.measured` gives it."""
@@ -24,6 +26,9 @@ RESAMPLES = 2_000
 SPLITS = 50
 NEAR = 1.2
 """A choice is good if it takes at most this many times the episodes of the best source."""
+
+AT_ONCE = 2
+"""Windows this many ticks apart, at most, come at about the same time."""
 
 SMALL_IS_GOOD = ("disagreement", "dissimilarity", "regions", "windows", "shift", "delay")
 """What the names of distances end with; of all other predictors more is better."""
@@ -149,6 +154,7 @@ def summary(groups: Sequence[Group], most: int, step: int) -> dict[str, Any]:
         "any_source": {"good": float(anyone.mean()), "speedup": geometric(found.speedups)},
         "best_source": {"speedup": geometric(best), "hurt": float((best < 1).mean())},
         "ceiling": ceiling(found.runs),
+        "delays": by_delay(groups, found),
         "predictors": {name: judged(score, found) for name, score in found.scores.items()},
         "none_or_first": {
             name: refused(score, found) for name, score in found.scores.items() if name.startswith("rehearsal")
@@ -157,6 +163,23 @@ def summary(groups: Sequence[Group], most: int, step: int) -> dict[str, Any]:
             name: {"mean": float(shares.mean()), "at_least_95_percent": float((shares >= 0.95).mean())}
             for name, shares in modelled.items()
         },
+    }
+
+
+def by_delay(groups: Sequence[Group], found: Table) -> dict[str, dict[str, float]]:
+    """The speed-ups by whether the target's windows come earlier than the source's, later, or about the same time."""
+    pairs = [(source["formula"], group["target"]["formula"]) for group in groups for source in group["sources"]]
+    delays = np.array([align(parse(source), parse(target)).delay for source, target in pairs])
+    speedups = found.speedups.ravel()
+    kinds = {"earlier": delays < -AT_ONCE, "alike": abs(delays) <= AT_ONCE, "later": delays > AT_ONCE}
+    return {
+        kind: {
+            "pairs": float(rows.sum()),
+            "hurt": float((speedups[rows] < 1).mean()),
+            "twice": float((speedups[rows] > 2).mean()),
+        }
+        for kind, rows in kinds.items()
+        if rows.any()
     }
 
 
@@ -195,6 +218,12 @@ def table(found: Mapping[str, Any]) -> str:
         f"{'any source':<78}{chance['good']:4.0%}{'':<16}{chance['speedup']:5.2f}",
         f"{'the best source':<78}{found['ceiling']:4.0%} (noise){'':<8}{best['speedup']:5.2f}",
     ]
+    for kind, each in found["delays"].items():
+        what = {"alike": f"within {AT_ONCE} ticks"}.get(kind, f"more than {AT_ONCE} ticks {kind}")
+        lines.append(
+            f"target's windows {what}: {each['pairs']:.0f} pairs, transfer hurts in {each['hurt']:.0%} and is at least "
+            f"twice as fast in {each['twice']:.0%}"
+        )
     for name, each in found["none_or_first"].items():
         lines.append(
             f"{name}, or no transfer: speed-up {each['speedup']:.2f}, {each['hurt']:.0%} of targets hurt, "

@@ -16,7 +16,6 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from statistics import fmean
@@ -200,22 +199,34 @@ def described(env: EnvironmentSpec) -> dict[str, Any]:
     }
 
 
-def kept(plan: Plan, group: int, folder: Path) -> Group:
-    """One group, from its file if it has been measured by the same plan."""
+def kept(plan: Plan, group: int, folder: Path) -> Group | None:
+    """A group from its file, if it has been measured by the same plan."""
     path = folder / f"{group:03d}.json"
-    if path.exists():
-        found: Group = json.loads(path.read_bytes())
-        if found["plan"] == json.loads(json.dumps(asdict(plan))):
-            return found
+    found: Group | None = json.loads(path.read_bytes()) if path.exists() else None
+    return found if found is not None and found["plan"] == json.loads(json.dumps(asdict(plan))) else None
+
+
+def added(plan: Plan, group: int, folder: Path) -> Group:
+    """A group, measured and written to its file."""
     result = measured(plan, group)
-    write_bytes(path, json.dumps(result, indent=1).encode())
+    write_bytes(folder / f"{group:03d}.json", json.dumps(result, indent=1).encode())
     return result
 
 
-def groups(plan: Plan, count: int, folder: Path, workers: int) -> Iterator[Group]:
-    """All groups as they are done, in any order."""
-    work = (joblib.delayed(kept)(plan, group, folder) for group in range(count))
-    yield from joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(work)
+def all_groups(plan: Plan, count: int, folder: Path, workers: int) -> list[Group]:
+    """Every group in order; those that are not kept are measured, and how far that is goes to stderr."""
+    found = {group: result for group in range(count) if (result := kept(plan, group, folder)) is not None}
+    missing = [group for group in range(count) if group not in found]
+    print(f"{len(found)} of {count} groups are in {folder}", file=sys.stderr)
+    began = time.monotonic()
+    work = (joblib.delayed(added)(plan, group, folder) for group in missing)
+    results = joblib.Parallel(n_jobs=workers, return_as="generator_unordered")(work)
+    for done, result in enumerate(results, start=1):
+        found[result["group"]] = result
+        minutes = (time.monotonic() - began) / 60
+        left = minutes / done * (len(missing) - done)
+        print(f"{len(found)} of {count} groups, {minutes:.0f} min, about {left:.0f} to go", file=sys.stderr)
+    return [found[group] for group in range(count)]
 
 
 def main() -> None:
@@ -227,13 +238,9 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("runs/similarity"), help="where the results go")
     parser.add_argument("--workers", type=int, default=2, help="processes")
     arguments = parser.parse_args()
-    plan, began, done = Plan(seed=arguments.seed, runs=arguments.runs), time.monotonic(), []
-    for result in groups(plan, arguments.groups, arguments.out / "groups", arguments.workers):
-        done.append(result)
-        minutes = (time.monotonic() - began) / 60
-        left = minutes / len(done) * (arguments.groups - len(done))
-        print(f"{len(done)} of {arguments.groups} groups, {minutes:.0f} min, {left:.0f} to go", file=sys.stderr)
-    found = summary(sorted(done, key=lambda group: group["group"]), plan.goal.most, plan.goal.step)
+    plan = Plan(seed=arguments.seed, runs=arguments.runs)
+    done = all_groups(plan, arguments.groups, arguments.out / "groups", arguments.workers)
+    found = summary(done, plan.goal.most, plan.goal.step)
     write_bytes(arguments.out / "summary.json", json.dumps(found, indent=1).encode())
     print(table(found))
     draw_scatter(done, found, plan.goal.most, plan.goal.step, arguments.out / "similarity.png")
