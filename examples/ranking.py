@@ -269,7 +269,7 @@ def draw_scatter(groups: Sequence[Group], found: Mapping[str, Any], most: int, s
                 each.set_xscale("log")
                 each.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axes[0].set_ylabel("measured speed-up")
-        axes[0].legend(loc="upper left", handletextpad=0.1, markerscale=1.6)
+        axes[-1].legend(loc="lower right", handletextpad=0.1, markerscale=1.6)
         figure.savefig(path, bbox_inches="tight", dpi=150)
 
 
@@ -292,5 +292,5 @@ def draw_choices(found: Mapping[str, Any], path: Path) -> None:
         )
         axes.set_yticks(range(len(ordered)), [name for name, _ in ordered])
         axes.grid(axis="x")
-        axes.legend(loc="lower right")
+        axes.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
         figure.savefig(path, bbox_inches="tight", dpi=150)

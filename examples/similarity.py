@@ -5,7 +5,7 @@ learned and its values are transferred (Algorithm 2, the true formulas); the spe
 the target then takes to 95 % of the best. It is held against what is known before the first of them: distances between
 the formulas, the values, and what becomes of them in a model of the target's world from random walks.
 
-    python examples/similarity.py --groups 120 --runs 20 --out runs/similarity
+    python examples/similarity.py --groups 70 --runs 20 --out runs/similarity
 
 Each group is a file; the same command again goes on where it was stopped.
 """
@@ -232,7 +232,7 @@ def all_groups(plan: Plan, count: int, folder: Path, workers: int) -> list[Group
 def main() -> None:
     """Measure, then print and draw what predicts the speed-up and what does not."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--groups", type=int, default=120, help="targets, each with five sources")
+    parser.add_argument("--groups", type=int, default=70, help="targets, each with five sources")
     parser.add_argument("--runs", type=int, default=20, help="runs of learning of each target and source")
     parser.add_argument("--seed", type=int, default=0, help="the root seed")
     parser.add_argument("--out", type=Path, default=Path("runs/similarity"), help="where the results go")
