@@ -29,10 +29,11 @@ from ranking import Group, draw_choices, draw_scatter, summary, table
 from tickwise._files import write_bytes
 from tickwise._seeding import generator, seed_sequence
 from tickwise.envs.catalog import EnvironmentSpec
-from tickwise.envs.estimation import estimated, random_walks
+from tickwise.envs.estimation import estimated
 from tickwise.envs.planning import best_success_probability
 from tickwise.envs.random_tasks import Structure, random_task
 from tickwise.envs.tabulate import TabularMDP
+from tickwise.envs.walks import random_walks
 from tickwise.errors import ConfigurationError
 from tickwise.experiments.random_pairs import SETTINGS
 from tickwise.inference.prior import PathPrior
@@ -149,7 +150,9 @@ def measured(plan: Plan, group: int) -> Group:
     world = target_env.mdp()
     target = problem(target_env, world)
     walks = {n: random_walks(world, target.task, n, plan.rng(group, "walks", n)) for n in plan.walks}
-    models = {f"{n:,} walks": problem(target_env, estimated(world, walks[n])) for n in plan.walks}
+    models = {
+        f"{n:,} walks": problem(target_env, estimated(world, walks[n].states, walks[n].actions)) for n in plan.walks
+    }
     models["true model"] = target
 
     def rehearsed(model: Problem, q: NDArray[np.float32] | None) -> float:

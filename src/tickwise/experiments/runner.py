@@ -95,7 +95,8 @@ def run_units(units: Sequence[Unit], workers: int | Executor, display: Display) 
 def available_methods(spec: StudySpec, store: Store) -> tuple[str, ...]:
     """The methods that can run once the formulas are inferred, and that the specification has episodes for.
 
-    Method I needs no formula; II needs φ'^T, III and IV need φ^T, and so logical transferability; V needs φ^S alone, if it is satisfying.
+    Method I needs no formula; II needs φ'^T, III and IV need φ^T, and so logical transferability; V needs φ^S alone, if
+    it is satisfying.
     """
     formulas = {**study_formulas(spec, store), "source": satisfying_source(spec, store)}
     needed = {"II": "target_without_information", "III": "target", "IV": "target", "V": "source"}
