@@ -6,6 +6,8 @@ one step for the next.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -39,6 +41,38 @@ def slow_q_learning(
     problem: Problem, q: NDArray[np.float32], settings: QSettings, rng: np.random.Generator, episodes: int
 ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
     """Q-learning; changes ``q`` and returns what `collect` does."""
+    return _slow_learning(problem, q, lambda *_: settings.alpha, settings, rng, episodes)
+
+
+def slow_trusting(
+    problem: Problem,
+    q: NDArray[np.float32],
+    confidence: NDArray[np.float32],
+    visits: NDArray[np.uint32],
+    settings: QSettings,
+    patience: float,
+    rng: np.random.Generator,
+    episodes: int,
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Q-learning with confidence; changes ``q`` and ``visits`` and returns what `collect` does."""
+
+    def rate(u: int, s: int, action: int) -> float:
+        made = int(visits[u, s, action])
+        visits[u, s, action] += 1
+        return settings.alpha * (1.0 - float(confidence[u, s, action]) * patience / (patience + made))
+
+    return _slow_learning(problem, q, rate, settings, rng, episodes)
+
+
+def _slow_learning(
+    problem: Problem,
+    q: NDArray[np.float32],
+    rate: Callable[[int, int, int], float],
+    settings: QSettings,
+    rng: np.random.Generator,
+    episodes: int,
+) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+    """Q-learning with a rate for each update; changes ``q`` and returns what `collect` does."""
     returns = np.zeros(episodes, dtype=np.float32)
     paths = np.full((episodes, problem.task.horizon + 1), -1, dtype=np.int32)
     for episode in range(episodes):
@@ -54,7 +88,7 @@ def slow_q_learning(
             reward, over = monitor.advance(next_s)
             future = 0.0 if over else settings.gamma * float(q[next_u, next_s].max())
             old = float(q[u, s, action])
-            q[u, s, action] = old + settings.alpha * (reward + future - old)
+            q[u, s, action] = old + rate(u, s, action) * (reward + future - old)
             u, s = next_u, next_s
             paths[episode, monitor.tick] = s
             total += reward

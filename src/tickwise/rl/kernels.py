@@ -53,13 +53,18 @@ def q_learning(
     q: NDArray[np.float32],
     returns: NDArray[np.float32],
     paths: NDArray[np.int32],
+    updates: NDArray[np.uint32] | None = None,
+    confidence: NDArray[np.float32] | None = None,
+    patience: float = 0.0,
 ) -> None:
     """Q-learning (Section IV-B, Step 3) with ε-greedy actions and random ties; changes ``q`` in place.
 
     ``q`` has shape ``(memory states, states, actions)``. ``returns``, shape ``(episodes,)``, is filled with
     the undiscounted return of each episode. ``paths``, shape ``(episodes, horizon + 1)``, is filled with the
-    MDP states of each episode and -1 after its end; shape ``(0, 0)`` records nothing. The rest is the
-    problem's arrays, the settings and the generator's stream; see `tickwise.rl.qlearning` and
+    MDP states of each episode and -1 after its end; shape ``(0, 0)`` records nothing. ``updates``, of the
+    shape of ``q``, counts how often each entry was updated, and ``confidence``, likewise, slows an entry's
+    first updates down; see `tickwise.rl.trusting`. Without them the compiled loop has no trace of them. The
+    rest is the problem's arrays, the settings and the generator's stream; see `tickwise.rl.qlearning` and
     `tickwise.rl.stream`.
     """
     actions = successor.shape[1]
@@ -111,7 +116,13 @@ def q_learning(
             for a in range(1, actions):
                 best = max(best, q[next_u, next_s, a])
             target = gained if over else gained + gamma * best
-            updated = np.float32(q[u, s, action] + alpha * (target - q[u, s, action]))
+            rate = alpha
+            if updates is not None:
+                if confidence is not None:
+                    trust = confidence[u, s, action] * patience / (patience + updates[u, s, action])
+                    rate = alpha * (1.0 - trust)
+                updates[u, s, action] += np.uint32(1)
+            updated = np.float32(q[u, s, action] + rate * (target - q[u, s, action]))
             q[u, s, action] = updated
             if u == next_u and s == next_s:
                 # the update may have changed the best value of the very state that comes next
