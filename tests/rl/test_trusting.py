@@ -41,7 +41,7 @@ def test_without_confidence_it_is_q_learning(problem: Problem, seed: int, chosen
 def test_it_equals_its_twin_step_for_step(problem: Problem, seed: int, chosen: QSettings, patience: float):
     shape = problem.initial_q(chosen).shape
     draws = np.random.default_rng(seed)
-    confidence = (draws.random(shape) * draws.integers(0, 2, shape)).astype(np.float32)
+    confidence = (20 * draws.random(shape) * draws.integers(0, 2, shape)).astype(np.float32)
     values = draws.normal(50, 20, shape).astype(np.float32)
     learner = Trusting(chosen, patience).learner(problem, values, confidence)
     rng, slow_rng = np.random.default_rng(seed), np.random.default_rng(seed)
@@ -69,10 +69,10 @@ def test_every_step_is_one_visit(problem: Problem, seed: int):
 
 
 def test_the_rates_of_one_entry_by_hand():
-    """One state and one action, no discount, a reward of 8 in every episode, α = 1/2, c = 1/2 and h = 1.
+    """One state and one action, no discount, a reward of 8 in every episode, α = 1/2, c = 2 and h = 1.
 
-    The factors are 1 - c / (1 + n) = 1/2, 3/4: from 0, the first update goes a quarter of the way to 8, to 2, and the
-    second three eighths of the way from 2 to 8, to 4.25.
+    The rates are 1 / (2 + 2 / (1 + n)) = 1/4, 1/3, 3/8: from 0, the first update goes a quarter of the way to 8, to 2;
+    the second a third of the way from 2 to 8, to 4; the third three eighths of the way from 4 to 8, to 5.5.
     """
     problem = random_problem(0, states=1, actions=1, outcomes=1, horizon=1)
     task = problem.task
@@ -80,20 +80,20 @@ def test_the_rates_of_one_entry_by_hand():
     problem = replace(problem, task=eight)
     shape = problem.initial_q(QSettings()).shape
     learner = Trusting(QSettings(alpha=0.5, gamma=0.0, initial=0.0), patience=1.0).learner(
-        problem, confidence=np.full(shape, 0.5, dtype=np.float32)
+        problem, confidence=np.full(shape, 2.0, dtype=np.float32)
     )
     expected = []
-    for _ in range(2):
+    for _ in range(3):
         learner.learn(np.random.default_rng(0), 1)
         expected.append(float(learner.q.max()))
-    assert expected == [2.0, 4.25]
+    assert expected == pytest.approx([2.0, 4.0, 5.5])
 
 
 def test_it_comes_to_the_optimum_from_values_that_it_trusts_and_that_are_wrong():
     problem, chosen = small_problem(), QSettings(epsilon=0.05)
     shape = problem.initial_q(chosen).shape
     wrong = np.random.default_rng(3).uniform(0, 100, shape).astype(np.float32)
-    learner = Trusting(chosen, patience=20.0).learner(problem, wrong, np.full(shape, 0.99, dtype=np.float32))
+    learner = Trusting(chosen, patience=20.0).learner(problem, wrong, np.full(shape, 50.0, dtype=np.float32))
     learner.learn(np.random.default_rng(0), 60_000)
     best = optimal_value(problem.mdp, problem.task)
     assert evaluate(problem, learner.q, np.random.SeedSequence(1), 1000) == best
@@ -115,6 +115,6 @@ def test_what_it_refuses():
         Trusting(patience=0.0)
     with pytest.raises(DataError, match="use the same"):
         Trusting().learner(problem, confidence=np.zeros((1, 2, 3, 4), dtype=np.float32))
-    for wrong in (1.0, -0.1, np.nan):
-        with pytest.raises(DataError, match=r"not in \[0, 1\)"):
+    for wrong in (-0.1, np.inf, np.nan):
+        with pytest.raises(DataError, match="below 0 or not finite"):
             Trusting().learner(problem, confidence=np.full(shape, wrong, dtype=np.float32))

@@ -59,7 +59,8 @@ def slow_trusting(
     def rate(u: int, s: int, action: int) -> float:
         made = int(visits[u, s, action])
         visits[u, s, action] += 1
-        return settings.alpha * (1.0 - float(confidence[u, s, action]) * patience / (patience + made))
+        trust = float(confidence[u, s, action]) * patience / (patience + made)
+        return settings.alpha / (1.0 + settings.alpha * trust)
 
     return _slow_learning(problem, q, rate, settings, rng, episodes)
 

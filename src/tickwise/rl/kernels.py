@@ -120,7 +120,7 @@ def q_learning(
             if updates is not None:
                 if confidence is not None:
                     trust = confidence[u, s, action] * patience / (patience + updates[u, s, action])
-                    rate = alpha * (1.0 - trust)
+                    rate = alpha / (1.0 + alpha * trust)
                 updates[u, s, action] += np.uint32(1)
             updated = np.float32(q[u, s, action] + rate * (target - q[u, s, action]))
             q[u, s, action] = updated

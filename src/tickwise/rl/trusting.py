@@ -1,15 +1,19 @@
 """Q-learning that overwrites values slowly where it trusts them, such as values that were transferred.
 
-The n-th update of an entry, from n = 0, takes the rate α (1 - c h / (h + n)), where c in [0, 1) is the confidence in
-the value that the entry began with and h is the patience: as if c h updates of h had been made before. So a trusted
-value is not lost to the first few outcomes, and the longer an entry is learned the less it matters where it began.
+A value that moves by a share α with each update is a mean over about 1 / α of them. Confidence c in the value that an
+entry begins with counts as c more, and fades as the entry is updated: the n-th update, from n = 0, has the rate
 
-It ends where Q-learning ends. An entry's rates are those of Q-learning times factors from 1 - c to 1 that grow to 1.
-Where the rates α_n of Q-learning meet the conditions of its convergence, Σ α_n = ∞ and Σ α_n² < ∞, these do too: the
-first sum is at least (1 - c) Σ α_n, the second at most Σ α_n². Where α is constant, a deterministic world's values
-come nearer to the optimum by a share of at least α (1 - c) in each round of updates, as they do by α; and where
-chance keeps values moving around the optimum, they move in the end as they do in Q-learning, since the factors have
-come to 1. Confidence of 1 would never overwrite at first, so it is refused.
+    1 / (1 / α + c h / (h + n)),
+
+where h is the patience. So a trusted value is not lost to the first few outcomes, and the longer an entry is learned
+the less it matters where it began. Without confidence the rate is α.
+
+It ends where Q-learning ends. The rate is α times a factor from 1 / (1 + α c) to 1 that grows to 1. Where the rates of
+Q-learning meet the conditions of its convergence, Σ α_n = ∞ and Σ α_n² < ∞, these do too: the first sum is at least
+1 / (1 + c) of what it was, the second at most what it was. Where α is constant and nothing is random, each update goes
+at least a fixed share of the way, so that the error shrinks as it does in Q-learning, only by a smaller share at first;
+and where chance keeps values moving around the optimum, they move in the end as in Q-learning, since the rates have
+become the same.
 """
 
 from __future__ import annotations
@@ -28,7 +32,7 @@ from tickwise.rl.stream import put_back, take_stream
 
 @dataclass(frozen=True, slots=True)
 class Trusting:
-    """Q-learning with confidence in what it begins with; without any, it is Q-learning to the bit.
+    """Q-learning with confidence in what it begins with; without any it is Q-learning to the bit.
 
     Attributes:
         settings: Learning rate, discount, exploration and initial values.
@@ -39,7 +43,7 @@ class Trusting:
     """
 
     settings: QSettings = field(default_factory=QSettings)
-    patience: float = 10.0
+    patience: float = 3.0
 
     def __post_init__(self) -> None:
         if not 0 < self.patience < np.inf:
@@ -56,7 +60,7 @@ class Trusting:
         Args:
             problem: What to learn.
             q: Values to begin with, which are copied; None for those of the settings.
-            confidence: The confidence in each of them, in [0, 1), of the same shape; None for none.
+            confidence: The confidence in each of them, in updates, of the same shape; None for none.
 
         Raises:
             DataError: If the confidence has another shape or is out of range.
@@ -65,8 +69,8 @@ class Trusting:
         trust = np.zeros(values.shape, dtype=np.float32) if confidence is None else confidence
         if trust.shape != values.shape:
             raise DataError(f"the confidence has shape {trust.shape} and the values {values.shape}; use the same")
-        if not ((trust >= 0) & (trust < 1)).all():
-            raise DataError("a confidence is not in [0, 1)")
+        if not ((trust >= 0) & (trust < np.inf)).all():
+            raise DataError("a confidence is below 0 or not finite")
         visits = np.zeros(values.shape, dtype=np.uint32)
         return TrustingLearner(problem, values, self, np.ascontiguousarray(trust, dtype=np.float32), visits)
 

@@ -46,15 +46,15 @@ def transfer_q(
             extended states.
         AutomatonError: If φ^T is not structurally transferable from φ^S.
     """
-    _check(source_mdp, source_memory, source_q, target_mdp, target_memory)  # line 1
+    check_transfer(source_mdp, source_memory, source_q, target_mdp, target_memory)  # line 1
     shape = (target_memory.n_states, target_mdp.n_states, target_mdp.n_actions)
     target_q = np.full(shape, initial, dtype=np.float32)
     for i, target in enumerate(target_memory.tables):  # line 2
         i_hat = i % len(source_memory.tables)  # line 4
         source = source_memory.tables[i_hat]
         xi = bijections(target.automaton, source.automaton)
-        near = _centroids(source, source_mdp) if landmarks is None else landmarks[0][i_hat]
-        far = _centroids(target, target_mdp) if landmarks is None else landmarks[1][i]
+        near = centroids(source, source_mdp) if landmarks is None else landmarks[0][i_hat]
+        far = centroids(target, target_mdp) if landmarks is None else landmarks[1][i]
         pairs = zip(source.automaton.predicates, target.automaton.predicates, strict=True)
         states = [
             similar_states(source_mdp, rho_source, near[j], target_mdp, rho_target, far[j])
@@ -68,7 +68,7 @@ def transfer_q(
     return target_q  # line 14
 
 
-def _centroids(table: TickTable, mdp: TabularMDP) -> NDArray[np.float64]:
+def centroids(table: TickTable, mdp: TabularMDP) -> NDArray[np.float64]:
     """Cr(ρ) of each primitive's region, shape ``(primitives, variables)``."""
     primitives = table.automaton.conjunction.primitives
     return np.array([primitive.box.centroid(mdp.variables, mdp.limits) for primitive in primitives])
@@ -105,7 +105,7 @@ def similar_states(
         != holds(source, source_cells, source_mdp.variables)[None, :]
     )
     nearest = most_alike(source_cells - source_centre, target_cells - target_centre, differs)
-    return _members(source_mdp)[nearest[target_mdp.cell], _orientation(target_mdp)]
+    return members(source_mdp)[nearest[target_mdp.cell], orientations(target_mdp)]
 
 
 def most_alike(
@@ -166,13 +166,19 @@ def check_copies(source: Sequence[TickTable], target: Sequence[TickTable]) -> No
         )
 
 
-def _check(
+def check_transfer(
     source_mdp: TabularMDP,
     source_memory: Memory,
     source_q: NDArray[np.float32],
     target_mdp: TabularMDP,
     target_memory: Memory,
 ) -> None:
+    """Refuse what cannot be transferred; the arguments are `transfer_q`'s.
+
+    Raises:
+        DataError: As `transfer_q`.
+        AutomatonError: If the numbers of disjuncts do not fit.
+    """
     if not (source_memory.tables and target_memory.tables):
         raise DataError("extended Q-functions need memories made of timed automata; use automaton_memory")
     check_copies(source_memory.tables, target_memory.tables)
@@ -189,12 +195,12 @@ def _check(
     wanted = (source_memory.n_states, source_mdp.n_states, source_mdp.n_actions)
     if source_q.shape != wanted:
         raise DataError(f"the source's Q-function has shape {source_q.shape}; use {wanted}")
-    if _members(source_mdp).shape[1] != _members(target_mdp).shape[1]:
+    if members(source_mdp).shape[1] != members(target_mdp).shape[1]:
         raise DataError("the worlds have different numbers of orientations in a cell; transfer needs the same")
 
 
-def _orientation(mdp: TabularMDP) -> NDArray[np.int64]:
-    """The number of each state among those of its cell, such as its heading."""
+def orientations(mdp: TabularMDP) -> NDArray[np.int64]:
+    """The number of each state among those of its cell, such as its heading, shape ``(states,)``."""
     order = np.argsort(mdp.cell, kind="stable")
     first = np.searchsorted(mdp.cell[order], np.arange(mdp.n_cells))
     orientation = np.empty(mdp.n_states, dtype=np.int64)
@@ -202,7 +208,7 @@ def _orientation(mdp: TabularMDP) -> NDArray[np.int64]:
     return orientation
 
 
-def _members(mdp: TabularMDP) -> NDArray[np.int64]:
+def members(mdp: TabularMDP) -> NDArray[np.int64]:
     """The states of each cell in order, shape ``(cells, orientations)``."""
     counts = np.bincount(mdp.cell, minlength=mdp.n_cells)
     if (counts != counts[0]).any():
