@@ -154,7 +154,7 @@ def slow_transfer(
                         if not pairs:
                             return nearest(False)
                         rank = min(pairs)[0]
-                        late = math.ceil(round(math.sqrt(rank[0]) / speed, 9)) if how.travel else 0
+                        late = math.floor(round(math.sqrt(rank[0]) / speed, 9)) if how.travel else 0
                         apart = []
                         for r, v in pairs:
                             if r == rank:

@@ -63,7 +63,7 @@ def matches(
         known: What may be taken, shape ``(source table states, source states, layers)``.
         progress: Whether clocks are compared by their progress; see `progress_valuations`.
         travel: Whether a place that is off by a way counts as the place it is like, so many ticks later as the way
-            takes at the greatest speed in the target's world.
+            takes at the greatest speed in the target's world; only whole ticks count.
 
     Yields:
         The target's table state and the match.
@@ -80,7 +80,7 @@ def matches(
         there = there[there > 0] if there[-1] > 0 else there
         own = np.flatnonzero(target.table.location == location)
         state, gap, usable = _places(source, target, int(target.table.automaton.stages[location]), known[there])
-        delays, late = np.unique(np.ceil(np.round(np.sqrt(gap) / speed, 9)), return_inverse=True)
+        delays, late = np.unique(np.floor(np.round(np.sqrt(gap) / speed, 9)), return_inverse=True)
         late = late.reshape(gap.shape)
         for u in own[own > 0]:
             aim = np.repeat(wanted[u][None, None], len(delays), axis=0)
