@@ -23,11 +23,12 @@ from tickwise.experiments.memory import peak_memory_mib
 from tickwise.experiments.recording import Recorder, recording_points
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import Collection, StudySpec, environment_of
-from tickwise.rl.learner import QLearning
+from tickwise.rl.learner import Learner, QLearning
 from tickwise.rl.qlearning import Problem, collect, evaluate
 from tickwise.rl.states import automaton_memory, disjunct_choice, tau_memory
+from tickwise.rl.trusting import Trusting, TrustingLearner
 from tickwise.transfer.hypothesis import tick_tables
-from tickwise.transfer.qtransfer import transfer_q
+from tickwise.transfer.variants import transfer
 
 
 def perform(job: Job, spec: StudySpec, store: Store, report: Report) -> None:
@@ -159,13 +160,15 @@ def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outco
     learning, subject = spec.learning, job.subject
     if subject == "V":
         return learn_in_closed_loop(job, spec, store, report)
-    form = QLearning(learning.source) if subject == "source" else learning.form(subject)
-    problem, q = learning_problem(spec, store, subject), None
-    if subject == "IV":
-        source = learning_problem(spec, store, "source")
-        learned = store.load(Job("learn", "source", job.run).name)["q"]
-        q = transfer_q(source.mdp, source.memory, learned, problem.mdp, problem.memory, learning.settings.initial)
-    learner = form.learner(problem, q)
+    problem = learning_problem(spec, store, subject)
+    if subject == "source":
+        # what was visited is counted only where transfer asks for it
+        form = Trusting(learning.source) if learning.transfer.needs_visits else QLearning(learning.source)
+        learner: Learner = form.learner(problem)
+    elif subject == "IV":
+        learner = _transferred(job, spec, store, problem)
+    else:
+        learner = learning.form(subject).learner(problem)
     rng = generator(spec.seed, spec.name, "learn", subject, job.run)
     fixed = seed_sequence(spec.seed, spec.name, "evaluate")
     episodes = learning.source_episodes if subject == "source" else learning.most_episodes[subject]
@@ -188,8 +191,22 @@ def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outco
     }
     if subject == "source":
         arrays["q"] = learner.q
+        if isinstance(learner, TrustingLearner):
+            arrays["visits"] = learner.visits
     goal = goal_reached(returns, learning.goal, optimal_value(problem.mdp, problem.task))
     return Outcome({"run": job.run, "episodes": episodes, "goal": goal}, arrays)
+
+
+def _transferred(job: Job, spec: StudySpec, store: Artefacts, problem: Problem) -> Learner:
+    """What learns the target from the source's values (Algorithm 2, or what the study has beyond it)."""
+    learning = spec.learning
+    learned = store.load(Job("learn", "source", job.run).name)
+    source = learning_problem(spec, store, "source")
+    visits, how = learned.get("visits"), learning.transfer
+    moved = transfer(source, learned["q"], visits, problem, learning.settings.initial, how)
+    if how.confidence is not None:
+        return Trusting(learning.settings).learner(problem, moved.q, moved.confidence)
+    return learning.form("IV").learner(problem, moved.q)
 
 
 _KINDS: dict[str, Callable[[Job, StudySpec, Artefacts, Report], Outcome]] = {

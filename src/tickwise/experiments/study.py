@@ -13,6 +13,7 @@ from tickwise.inference.tree import InferenceSettings
 from tickwise.rl.learner import LearningForm, QLearning
 from tickwise.rl.qlearning import QSettings
 from tickwise.transfer.closed_loop import LoopSettings
+from tickwise.transfer.variants import Transfer
 
 METHODS = ("I", "II", "III", "IV", "V")
 """The methods of Section V: τ-states; the formula without information gain; the formula; with transferred values. The
@@ -100,6 +101,7 @@ class Learning:
         disjunct: The name of the strategy that chooses the disjunct at the start of an episode (see
             `tickwise.rl.states.DISJUNCT_CHOICES`).
         forms: Method to the form that it learns in, where it is not Q-learning with `settings`.
+        transfer: How Method IV transfers values; by default as Algorithm 2 does.
         loop: How Method V goes about collecting, inferring and learning at once.
         loop_steps: Method V has an evaluation at each multiple of so many episodes.
         goal: The measure of convergence nearest to the paper's.
@@ -118,6 +120,7 @@ class Learning:
     )
     disjunct: str = "nearest_centroid"
     forms: dict[str, LearningForm] = field(default_factory=dict)
+    transfer: Transfer = field(default_factory=Transfer)
     loop: LoopSettings = field(default_factory=LoopSettings)
     loop_steps: int = 20
     goal: Goal = field(default_factory=Goal)

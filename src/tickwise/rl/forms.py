@@ -8,12 +8,14 @@ from tickwise.rl.counterfactual import Counterfactual
 from tickwise.rl.learner import LearningForm, QLearning
 from tickwise.rl.model import ModelBased
 from tickwise.rl.shaping import Shaping
+from tickwise.rl.trusting import Trusting
 
 FORMS: dict[str, type[LearningForm]] = {
     "q": QLearning,
     "counterfactual": Counterfactual,
     "shaping": Shaping,
     "actor_critic": ActorCritic,
+    "trusting": Trusting,
     "model": ModelBased,
 }
 """The forms by name; the first is the paper's, and another may be added here.

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.rl.kernels import q_learning
+from tickwise.rl.learner import check_form, first_values
 from tickwise.rl.qlearning import Problem, QSettings
 from tickwise.rl.stream import put_back, take_stream
 
@@ -37,15 +38,18 @@ class Trusting:
     Attributes:
         settings: Learning rate, discount, exploration and initial values.
         patience: The updates h of an entry after which half of the confidence in it is left.
+        form: The name of the form.
 
     Raises:
-        ConfigurationError: If the patience is not above 0.
+        ConfigurationError: If the patience is not above 0, or the name is that of another form.
     """
 
     settings: QSettings = field(default_factory=QSettings)
     patience: float = 3.0
+    form: str = field(default="trusting", kw_only=True)
 
     def __post_init__(self) -> None:
+        check_form(self)
         if not 0 < self.patience < np.inf:
             raise ConfigurationError(f"the patience is {self.patience}; use a number of updates above 0")
 
@@ -63,9 +67,10 @@ class Trusting:
             confidence: The confidence in each of them, in updates, of the same shape; None for none.
 
         Raises:
+            ConfigurationError: If the values have another shape than the problem.
             DataError: If the confidence has another shape or is out of range.
         """
-        values = problem.initial_q(self.settings) if q is None else q.copy()
+        values = first_values(problem, self.settings.initial, q)
         trust = np.zeros(values.shape, dtype=np.float32) if confidence is None else confidence
         if trust.shape != values.shape:
             raise DataError(f"the confidence has shape {trust.shape} and the values {values.shape}; use the same")

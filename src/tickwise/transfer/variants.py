@@ -78,6 +78,11 @@ class Transfer:
         if not self.within >= 0:
             raise ConfigurationError(f"within is {self.within}; use a distance of 0 or more")
 
+    @property
+    def needs_visits(self) -> bool:
+        """Whether the source's learning has to count what it updates."""
+        return self.visited or self.confidence is not None
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Transferred:
@@ -158,7 +163,7 @@ def _matches(source: Side, target: Side, visits: NDArray[np.uint32], how: Transf
 def _checked(visits: NDArray[np.uint32] | None, q: NDArray[np.float32], how: Transfer) -> NDArray[np.uint32]:
     """The visits; zeros where nothing asks for them."""
     if visits is None:
-        if how.visited or how.confidence is not None:
+        if how.needs_visits:
             raise DataError("what was visited is not known; give the visits of learning in the source")
         return np.zeros(q.shape, dtype=np.uint32)
     if visits.shape != q.shape:
