@@ -145,7 +145,7 @@ def draw(curves: dict[str, Sequence[Curve]]) -> Figure:
             axes.fill_between(episodes, 100 * low, 100 * high, color=colour, alpha=0.12, linewidth=0)
         axes.axhline(95, color="#555555", linewidth=1, linestyle=(0, (2, 2)))
         axes.set(xscale="log", ylim=(-5, 104), xlabel="episodes in the target task (log scale)")
-        axes.set_title(STUDIES[study].title)
+        axes.set_title(STUDIES[study].title.split(":")[0])
         if number == 0:
             axes.set_ylabel("greedy return, % of the way to V*")
         axes.grid(True)
