@@ -80,7 +80,7 @@ def test_curves_zoom_by_dragging_and_by_keys(opened: Open):
     further.click()
     assert reset.is_disabled()
     page.locator(".legend input").first.uncheck()
-    assert plot.locator(".mean").count() == 3
+    assert plot.locator(".mean").count() == 4
 
 
 @pytest.mark.parametrize("study", ["case", "tiny"])
