@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,13 +65,13 @@ class Episodes:
     @property
     def returns(self) -> NDArray[np.float32]:
         """The undiscounted return of each episode, shape ``(n,)``."""
-        return np.concatenate(self._returns) if self._returns else np.zeros(0, np.float32)
+        return _joined(self._returns) if self._returns else np.zeros(0, np.float32)
 
     @property
     def paths(self) -> NDArray[np.int32]:
         """The MDP states of each episode, -1 after its end, shape ``(n, horizon + 1)``."""
         empty = np.zeros((0, self.problem.task.horizon + 1), np.int32)
-        return np.concatenate(self._paths) if self._paths else empty
+        return _joined(self._paths) if self._paths else empty
 
     @property
     def starts(self) -> NDArray[np.int32]:
@@ -113,3 +114,10 @@ class Episodes:
         mdp, lengths = self.problem.mdp, (paths >= 0).sum(axis=1)
         values = np.where(paths[..., None] >= 0, mdp.coordinates[paths], np.nan)
         return LabelledTrajectories(values, lengths, labels, mdp.variables, tuple(map(str, range(len(paths)))))
+
+
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    """All parts as one array, which takes their place: it is asked for several times an episode."""
+    if len(parts) > 1:
+        parts[:] = [np.concatenate(parts)]
+    return parts[0]
