@@ -567,6 +567,7 @@ def open_folder(tmp_path: Path) -> Path:
 def test_a_file_that_may_not_be_read(tickwise: Tickwise, open_folder: Path, make: Callable[[Path], Path]):
     path = make(open_folder)
     path.chmod(0)
+    tickwise.fails("infer", open_folder / "none.csv")  # what a command imports late may lie where nobody can read
     message = f"cannot read {path}: Permission denied; check its permissions, and the room on the disk"
     with Nobody():
         with pytest.raises(TickwiseError) as caught:
