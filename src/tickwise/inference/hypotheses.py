@@ -23,6 +23,7 @@ from tickwise.logic.sdnf import SDNF, Primitive
 
 _NEAR = 0.8  # the share of draws whose windows are near the source's
 _TIE = 1e-9
+_SLACK = 1e-8  # more than what rounding hides
 _PURE = 200  # conjunctions that a disjunction is put together from
 
 
@@ -119,7 +120,8 @@ class Hypotheses:
         pool = np.concatenate([*single, sampled_starts(data, self.space, alone, 4 * self.count, self.rng)])
 
         def right(members: NDArray[np.bool_]) -> NDArray[np.float64]:
-            objective = Objective(data, weights * members, self.prior, self.space, alone, self._gaps, 0.0)
+            some = data.select(members)
+            objective = Objective(some, weights[members], self.prior, self.space, alone, self._gaps, 0.0)
             return objective(pool, np.full(len(pool), -np.inf))
 
         pure, left = np.round(right(data.labels < 0), 2), data.labels > 0
@@ -131,7 +133,8 @@ class Hypotheses:
             left = left & ~formula_signature(self.space.decode(chosen[-1][0], alone), data)
         parts = np.concatenate(chosen)
         picked = self.rng.integers(len(parts), size=(4 * self.count, self.copies))
-        self._select(parts[picked].reshape(4 * self.count, -1), data, weights)
+        self.positions = parts[picked].reshape(4 * self.count, -1)
+        self._select(self.positions, data, weights)
 
     def mass(self, trajectories: LabelledTrajectories, among: NDArray[np.float64]) -> float:
         """The mean share of some formulas that trajectories satisfy: the probability that they are good.
@@ -151,11 +154,21 @@ class Hypotheses:
     def _select(
         self, candidates: NDArray[np.float64], data: LabelledTrajectories, weights: NDArray[np.float64]
     ) -> None:
+        """Keep those with the fewest errors of some candidates, which hold the present positions."""
+        heaviest, kept = np.argsort(-weights, kind="stable"), self._kept(data)  # what settles most of them comes first
+        data, weights = data.select(heaviest), weights[heaviest]
         objective = Objective(data, weights, self.prior, self.space, self.shape, self._gaps, 0.0)
-        candidates = np.unique(np.rint(candidates) if not any(self.space.continuous) else candidates, axis=0)
-        errors = np.round(1 - objective(candidates, np.full(len(candidates), -np.inf)), 9)
-        order = np.lexsort((self.rng.random(len(errors)), errors))[: self._kept(data)]
+        # who is worse than each of so many others will not be kept, and need not be measured to the end
+        others, enough = self._distinct(self.positions[:kept]), -np.inf
+        if len(others) == kept:
+            enough = float(objective(others, np.full(kept, -np.inf)).min()) - _SLACK
+        candidates = self._distinct(candidates)
+        errors = np.round(1 - objective(candidates, np.full(len(candidates), enough)), 9)
+        order = np.lexsort((self.rng.random(len(errors)), errors))[:kept]
         self.positions, self.errors = candidates[order], errors[order]
+
+    def _distinct(self, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.unique(np.rint(positions) if not any(self.space.continuous) else positions, axis=0)
 
     def _kept(self, data: LabelledTrajectories) -> int:
         return max(self.count // 10, 1) if data.positives else self.count

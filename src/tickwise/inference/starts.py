@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._jit import njit
 from tickwise.inference.kernels import ALWAYS, ALWAYS_EVENTUALLY, EVENTUALLY, EVENTUALLY_ALWAYS, Shape
-from tickwise.inference.space import SearchSpace
+from tickwise.inference.space import SearchSpace, SpaceArrays
 from tickwise.inference.trajectories import LabelledTrajectories
 
 _LONGEST_STAY = 6
@@ -32,70 +33,111 @@ def sampled_starts(
     Returns:
         Positions, shape ``(count, dimensions)``; `decode` makes them valid.
     """
-    rows = {label: np.flatnonzero(data.labels == label) for label in (1, -1)}
-    positions = []
-    for _ in range(count):
-        position: list[float] = []
-        for low, high in zip(shape.starts[:-1], shape.starts[1:], strict=True):
-            preferred = rows[1 if rng.random() < 0.75 else -1]
-            row = int(rng.choice(preferred if len(preferred) else len(data)))
-            states = data.values[row, : data.lengths[row]]
-            ticks = np.sort(rng.integers(0, min(len(states), space.horizon + 1), size=int(high - low)))
-            for j, tick in zip(range(low, high), ticks.tolist(), strict=True):
+    good, bad = np.flatnonzero(data.labels == 1), np.flatnonzero(data.labels == -1)
+    positions = np.empty((count, len(space.units(shape))))
+    _fill(data.values, data.lengths, good, bad, space.arrays(), space.horizon, shape, rng, positions)
+    return positions
+
+
+@njit
+def _fill(
+    values: NDArray[np.float64],
+    lengths: NDArray[np.int64],
+    good: NDArray[np.int64],
+    bad: NDArray[np.int64],
+    space: SpaceArrays,
+    horizon: int,
+    shape: Shape,
+    rng: np.random.Generator,
+    positions: NDArray[np.float64],
+) -> None:
+    """Fill positions; a primitive's block is as in `tickwise.inference.space`."""
+    for position in positions:
+        at = 0
+        for disjunct in range(len(shape.starts) - 1):
+            low, high = shape.starts[disjunct], shape.starts[disjunct + 1]
+            preferred = good if rng.random() < 0.75 else bad
+            row = rng.integers(0, len(preferred) if len(preferred) else len(values))
+            if len(preferred):
+                row = preferred[row]
+            states = values[row, : lengths[row]]
+            ticks = np.empty(high - low, dtype=np.int64)
+            for j in range(len(ticks)):
+                ticks[j] = rng.integers(0, min(len(states), horizon + 1))
+            ticks.sort()
+            for j in range(low, high):
                 stay = int(rng.integers(0, _LONGEST_STAY + 1))
-                box = _box(states[tick : tick + stay + 1], space, rng)
+                box = position[at : at + 2 * len(space.low)]
+                _box(states[ticks[j - low] : ticks[j - low] + stay + 1], space, rng, box)
+                at += len(box)
                 # what a complemented predicate has to do with a visited box, nobody knows: any window may do
-                operator = EVENTUALLY if shape.complemented[j] else int(shape.operators[j])
-                times = _times(operator, states, tick, stay, box, space, rng)
-                position += [*box, *times[: 3 if shape.operators[j] >= EVENTUALLY_ALWAYS else 2]]
-        positions.append(position)
-    return np.array(positions, dtype=np.float64).reshape(count, len(space.units(shape)))
+                operator = EVENTUALLY if shape.complemented[j] else shape.operators[j]
+                times = _times(operator, states, ticks[j - low], stay, box, space, horizon, rng)
+                for k in range(3 if shape.operators[j] >= EVENTUALLY_ALWAYS else 2):
+                    position[at + k] = times[k]
+                at += 3 if shape.operators[j] >= EVENTUALLY_ALWAYS else 2
 
 
-def _box(visited: NDArray[np.float64], space: SearchSpace, rng: np.random.Generator) -> list[float]:
+@njit
+def _box(visited: NDArray[np.float64], space: SpaceArrays, rng: np.random.Generator, box: NDArray[np.float64]) -> None:
     """The sides of a box around some states, as positions, at times a little wider."""
-    numbers: list[float] = []
-    for column, (edges, continuous) in enumerate(zip(space.edges, space.continuous, strict=True)):
-        low, high = float(visited[:, column].min()), float(visited[:, column].max())
-        if continuous:
-            slack = rng.random(2) * 0.1 * (edges[-1] - edges[0])
-            numbers += [low - slack[0], high + slack[1]]
+    for column in range(len(space.low)):
+        low, high = visited[:, column].min(), visited[:, column].max()
+        first, second = rng.random(), rng.random()
+        count = space.counts[column]
+        if count:
+            edges = space.candidates[column, :count]
+            box[2 * column] = np.searchsorted(edges, low, side="right") - 1 - (first < 0.25)
+            box[2 * column + 1] = np.searchsorted(edges, high, side="left") + (second < 0.25)
         else:
-            wider = rng.random(2) < 0.25
-            numbers += [
-                float(np.searchsorted(edges, low, side="right") - 1 - wider[0]),
-                float(np.searchsorted(edges, high, side="left") + wider[1]),
-            ]
-    return numbers
+            span = space.high[column] - space.low[column]
+            box[2 * column] = low - first * 0.1 * span
+            box[2 * column + 1] = high + second * 0.1 * span
 
 
+@njit
 def _times(
     operator: int,
     states: NDArray[np.float64],
     tick: int,
     stay: int,
-    box: list[float],
-    space: SearchSpace,
+    box: NDArray[np.float64],
+    space: SpaceArrays,
+    horizon: int,
     rng: np.random.Generator,
-) -> tuple[float, float, float]:
+) -> tuple[int, int, int]:
     """A window and a duration with which the trajectory satisfies the operator, or nearly so."""
-    before, after = rng.integers(0, space.horizon // 2 + 1, size=2)
+    before = int(rng.integers(0, horizon // 2 + 1))
+    after = int(rng.integers(0, horizon // 2 + 1))
     if operator == ALWAYS and rng.random() < 0.5:
-        return float(tick), float(tick + max(stay, 1)), 0.0
+        return tick, tick + max(stay, 1), 0
     if operator == ALWAYS_EVENTUALLY and rng.random() < 0.5:
         # from the first tick to the last, with the longest absence from the box between two visits
-        visits = np.flatnonzero(_visits(states, box, space))
-        absence = int(np.diff(visits, prepend=-1, append=len(states)).max()) - 1 if len(visits) else stay
-        return 0.0, float(space.horizon - absence), float(max(absence, 1))
-    return float(tick - before), float(tick + after), float(max(stay, 1))
+        absence = _longest_absence(states, box, space)
+        if absence == len(states):
+            absence = stay
+        return 0, horizon - absence, max(absence, 1)
+    return tick - before, tick + after, max(stay, 1)
 
 
-def _visits(states: NDArray[np.float64], box: list[float], space: SearchSpace) -> NDArray[np.bool_]:
-    """At which ticks a trajectory is in a box of positions."""
-    within = np.ones(len(states), dtype=np.bool_)
-    for column, (edges, continuous) in enumerate(zip(space.edges, space.continuous, strict=True)):
-        low, high = box[2 * column : 2 * column + 2]
-        if not continuous:
-            low, high = (edges[int(np.clip(side, 0, len(edges) - 1))] for side in (low, high))
-        within &= (states[:, column] >= low) & (states[:, column] <= high)
-    return within
+@njit
+def _longest_absence(states: NDArray[np.float64], box: NDArray[np.float64], space: SpaceArrays) -> int:
+    """The most ticks in a row that a trajectory is outside a box of positions."""
+    longest = absence = 0
+    for t in range(len(states)):
+        absence = 0 if _within(states[t], box, space) else absence + 1
+        longest = max(longest, absence)
+    return longest
+
+
+@njit
+def _within(state: NDArray[np.float64], box: NDArray[np.float64], space: SpaceArrays) -> bool:
+    """Whether a state is in a box of positions."""
+    for column in range(len(space.low)):
+        low, high, count = box[2 * column], box[2 * column + 1], space.counts[column]
+        if count:
+            low = space.candidates[column, int(min(max(low, 0), count - 1))]
+            high = space.candidates[column, int(min(max(high, 0), count - 1))]
+        if state[column] < low or state[column] > high:
+            return False
+    return True
