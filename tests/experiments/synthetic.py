@@ -159,6 +159,7 @@ def _run(spec: StudySpec, method: str, run: int, rng: np.random.Generator) -> di
         },
         "window_mean": float(blocks[: spec.learning.window // block].mean()),
         "end_mean": float(blocks[-len(blocks) // 5 :].mean()),
+        "final": float(evaluation[-1]),
         "blocks": blocks,
         "evaluation_episodes": grid,
         "evaluation_returns": evaluation,
@@ -175,6 +176,7 @@ def _summary(method: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
     statistics |= {
         name: {"iqm": float(np.mean(values)), "low": min(values), "high": max(values)} for name, values in means.items()
     }
+    columns["final"] = [run["final"] for run in runs]
     spent = [_spent(method, run) for run in runs]
     everything = [None if run["learning"] is None else run["collection"] + run["learning"] for run in spent]
     statistics["target_episodes"] = {

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from tickwise.experiments.measures import (
     block_means,
+    difference_statistics,
     episode_statistics,
     final_mean,
     goal_reached,
@@ -144,3 +145,10 @@ def test_no_ratio_where_a_fast_run_did_not_get_there():
 def test_no_episodes_count_as_one():
     assert ratio([100, 100], [0, 0], 500) == {"value": 100.0, "at_least": False}
     assert ratio([0, 0], [10, 10], 500) == {"value": 0.0, "at_least": False}
+
+
+def test_the_difference_of_means_and_its_noise():
+    found = difference_statistics([3.0, 5.0], [1.0, 1.0, 1.0], 0)
+    assert (found["value"], found["low"], found["high"]) == (3.0, 2.0, 4.0)  # the means of 3 and 5 drawn twice
+    assert difference_statistics([3.0, 3.0], [1.0, 1.0], 0) == {"value": 2.0, "low": 2.0, "high": 2.0}
+    assert difference_statistics([3.0], [1.0, 2.0], 0) == {"value": 1.5, "low": None, "high": None}

@@ -146,6 +146,30 @@ def sure_ratio(slow: Sequence[int | None], fast: Sequence[int | None], limit: in
     return float(means[0] / means[1])
 
 
+def difference_statistics(ours: Sequence[float], theirs: Sequence[float], seed: int) -> dict[str, float | None]:
+    """How much greater the mean over our runs is than the mean over theirs.
+
+    Args:
+        ours: A number of each run, at least one.
+        theirs: The same of the other runs.
+        seed: The seed of the bootstrap.
+
+    Returns:
+        ``value``, and its 95 % bootstrap interval over both, ``low`` and ``high``, which are None where either has one
+        run only, so that nothing is known of the noise.
+    """
+    one, other = np.asarray(ours, dtype=np.float64), np.asarray(theirs, dtype=np.float64)
+    value = float(one.mean() - other.mean())
+    if min(len(one), len(other)) < 2:
+        return {"value": value, "low": None, "high": None}
+    if np.ptp(one) == 0 and np.ptp(other) == 0:
+        return {"value": value, "low": value, "high": value}
+    rng = np.random.default_rng(seed)
+    found = bootstrap((one, other), _mean_difference, method="percentile", rng=rng, n_resamples=4999)
+    interval = found.confidence_interval
+    return {"value": value, "low": float(interval.low), "high": float(interval.high)}
+
+
 def median_statistics(values: Sequence[float], seed: int) -> dict[str, Any]:
     """The median of some ratios and its 95 % bootstrap interval.
 
@@ -169,6 +193,10 @@ def median_statistics(values: Sequence[float], seed: int) -> dict[str, Any]:
         "count": len(numbers),
         "quartiles": quartiles,
     }
+
+
+def _mean_difference(ours: NDArray[np.float64], theirs: NDArray[np.float64], axis: int = -1) -> Any:
+    return ours.mean(axis=axis) - theirs.mean(axis=axis)
 
 
 def _interquartile_mean(values: NDArray[np.float64], axis: int = -1) -> Any:

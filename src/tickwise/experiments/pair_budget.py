@@ -8,28 +8,39 @@ from typing import Any
 import numpy as np
 
 from tickwise.experiments.budget import totals
-from tickwise.experiments.measures import median_statistics, sure_ratio
+from tickwise.experiments.measures import difference_statistics, median_statistics, sure_ratio
 from tickwise.experiments.study import StudySpec
 
 CLOSED, RIVAL, PLAIN = "V", "IV", ("III", "I")
 """The closed loop, what it is compared with, and learning without transfer: with a formula where there is one."""
 
-_NOTHING: dict[str, Any] = {"totals": {}, "ratio": None, "plain": None, "negative": None, "transferable": None}
+_NOTHING: dict[str, Any] = {
+    "totals": {},
+    "ratio": None,
+    "plain": None,
+    "slower": None,
+    "ends": None,
+    "negative": False,
+    "transferable": None,
+}
 
 
-def pair_budget(spec: StudySpec, methods: Mapping[str, Any]) -> dict[str, Any]:
+def pair_budget(spec: StudySpec, summary: Mapping[str, Any]) -> dict[str, Any]:
     """What one pair cost.
 
     Args:
         spec: The pair.
-        methods: The methods of its summary.
+        summary: Its summary.
 
     Returns:
         ``totals``, by method all target episodes of each run; ``ratio``, how many times fewer the closed loop needs
         than Method IV, None where either was not carried out; ``plain``, the method that learns without transfer;
-        ``negative``, whether the closed loop's median run needs more episodes than that one's, where a run that did not
-        get there counts with all its episodes; and ``transferable``, in how many runs the closed loop found that it is.
+        ``slower``, whether the closed loop's median run needs more episodes than that one's, where a run that did not
+        get there counts with all its episodes; ``ends``, how much better it is at its end, in shares of the way from
+        always failing to V*, with an interval (see `difference_statistics`); ``negative``, whether it is worse by more
+        than the noise between runs; and ``transferable``, in how many runs the closed loop found that it is.
     """
+    methods = summary["methods"]
     if CLOSED not in methods:
         return dict(_NOTHING)
     spent = {name: totals(method["target_episodes"]) for name, method in methods.items()}
@@ -38,13 +49,16 @@ def pair_budget(spec: StudySpec, methods: Mapping[str, Any]) -> dict[str, Any]:
     ratio = None
     if RIVAL in methods:
         ratio = sure_ratio(_filled(spent[RIVAL], limits[RIVAL]), _filled(spent[CLOSED], limits[CLOSED]), 0)
-    negative = None
+    slower = ends = None
     if plain is not None:
         ours, theirs = (float(np.median(_filled(spent[name], limits[name]))) for name in (CLOSED, plain))
-        negative = ours > theirs
+        slower, way = ours > theirs, summary["v_star"] - summary["fail"]
+        mine, others = ([end / way for end in methods[name]["final"]] for name in (CLOSED, plain))
+        ends = difference_statistics(mine, others, spec.seed)
     loops = methods[CLOSED]["loops"]
     return {
-        "totals": spent, "ratio": ratio, "plain": plain, "negative": negative,
+        "totals": spent, "ratio": ratio, "plain": plain, "slower": slower,
+        "ends": ends, "negative": ends is not None and ends["high"] is not None and ends["high"] < 0,
         "transferable": sum(loop["transferable"] for loop in loops), "of": len(loops), "name": spec.name,
     }  # fmt: skip
 
@@ -59,8 +73,10 @@ def suite_budget(rows: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]
     Returns:
         ``ratio``, the median over the pairs of how many times fewer target episodes the closed loop needs than Method
         IV; ``median``, by method the median over those pairs of the median run; ``reached``, on how many pairs most
-        runs of the closed loop got there; ``negative``, the names of the pairs where it needs more than learning
-        without transfer; and ``of``, how many pairs it was carried out on. Statistics are those of `median_statistics`.
+        runs of the closed loop got there; ``slower``, the names of the pairs where it needs more than learning without
+        transfer; ``negative``, by how much it ends worse than that on the pairs where it does by more than the noise
+        between runs, by name; and ``of``, how many pairs it was carried out on. Statistics are those of
+        `median_statistics`.
     """
     budgets = [row["budget"] for row in rows if row["budget"]["totals"]]
     both = [budget for budget in budgets if budget["ratio"] is not None]
@@ -72,7 +88,8 @@ def suite_budget(rows: Sequence[Mapping[str, Any]], seed: int) -> dict[str, Any]
             for name in (RIVAL, CLOSED)
         },
         "reached": sum(_most_reached(budget["totals"][CLOSED]) for budget in budgets),
-        "negative": [budget["name"] for budget in budgets if budget["negative"]],
+        "slower": [budget["name"] for budget in budgets if budget["slower"]],
+        "negative": {budget["name"]: -budget["ends"]["value"] for budget in budgets if budget["negative"]},
     }
 
 

@@ -80,7 +80,7 @@ def _row(spec: StudySpec, results: Mapping[str, Any]) -> dict[str, Any]:
             for method, found in summary["methods"].items()
         },
         "speed_ups": _speed_ups(spec, summary["methods"]),
-        "budget": pair_budget(spec, summary["methods"]),
+        "budget": pair_budget(spec, summary),
     }  # fmt: skip
 
 

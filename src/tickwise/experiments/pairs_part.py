@@ -86,7 +86,8 @@ def pairs_verdict(results: Mapping[str, Any]) -> list[str]:
         sentences.append(
             f"With collection counted, the closed loop gets to 95 % of V* in {found['median']:.1f} "
             f"[{found['low']:.1f}, {found['high']:.1f}] times fewer episodes than Method IV, and on "
-            f"{len(budget['negative'])} of {budget['of']} pairs it needs more than learning without transfer."
+            f"{len(budget['slower'])} of {budget['of']} pairs it needs more than learning without transfer; on "
+            f"{len(budget['negative'])} it ends worse than that by more than the noise between runs."
         )
     return sentences
 
@@ -94,7 +95,9 @@ def pairs_verdict(results: Mapping[str, Any]) -> list[str]:
 def _budget(found: Mapping[str, Any]) -> dict[str, Any]:
     cells = [_episodes(found["median"][name]) for name in ("IV", "V")] + [_times(found["ratio"])]
     cells.append({"text": f"{found['reached']} of {found['of']}", "note": "pairs, most runs"})
-    cells.append({"text": f"{len(found['negative'])} of {found['of']}", "note": ", ".join(found["negative"])})
+    cells.append({"text": f"{len(found['slower'])} of {found['of']}", "note": ", ".join(found["slower"])})
+    worse = ", ".join(f"{name} by {amount:.0%}" for name, amount in found["negative"].items())
+    cells.append({"text": f"{len(found['negative'])} of {found['of']}", "note": worse})
     return {"of": found["of"], "cells": cells}
 
 

@@ -117,6 +117,7 @@ def _run(spec: StudySpec, store: Store, method: str, run: int, values: tuple[flo
         "stays": {level: stays(episodes, returns, value) for level, value in thresholds.items()},
         "window_mean": float(content["blocks"][:window].mean(dtype="float64")),
         "end_mean": final_mean(content["blocks"]),
+        "final": float(returns[-1]),
     }
 
 
@@ -142,6 +143,7 @@ def _method_summary(
         **means,
         **closed,
         "episodes": [result["episodes"] for result in results],
+        "final": [result["final"] for result in results],
         "target_episodes": spent,
         "statistics": statistics | {"target_episodes": budget_statistics(spent, spec.seed)},
     }

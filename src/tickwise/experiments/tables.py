@@ -43,7 +43,10 @@ def _pairs(found: Mapping[str, Any]) -> Iterator[str]:
             f"IV/V by all target episodes to 95 % of V*: median {ratio['median']:.1f} "
             f"[{ratio['low']:.1f}, {ratio['high']:.1f}] over {ratio['count']} pairs"
         )
-        yield f"V needs more than learning without transfer: {len(budget['negative'])} of {budget['of']} pairs"
+        yield (
+            f"V needs more than learning without transfer on {len(budget['slower'])} of {budget['of']} pairs, "
+            f"and ends worse by more than noise on {len(budget['negative'])}"
+        )
     for pair, measures in found["speed_ups"].items():
         goal = measures["goal"]
         if goal["median"] is not None:
