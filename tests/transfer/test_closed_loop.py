@@ -113,6 +113,16 @@ def test_a_structure_that_cannot_say_it_is_not_transferable():
     assert share_of_the_optimum(loop) > 0.95
 
 
+def test_the_verdict_is_taken_back_where_a_formula_of_the_structure_is_found():
+    loop = EITHER.loop()
+    loop._refuted = "No."
+    assert (loop.transferable, loop.reason) == (False, "No.")
+    loop._act_on(sdnf("F[0,1] (x <= 1) & F[3,5] (x >= 2)"))
+    assert not loop.transferable
+    loop._act_on(sdnf(f"({EITHER.source}) | ({EITHER.source})"))
+    assert (loop.transferable, loop.reason) == (True, "")
+
+
 def test_what_nothing_was_found_for_is_tried_again(monkeypatch: pytest.MonkeyPatch):
     loop = ERRAND.loop(patience=15)
     tried: list[int] = []

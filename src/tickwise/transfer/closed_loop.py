@@ -54,7 +54,8 @@ class LoopSettings:
         positives: Good episodes before a formula is acted on.
         fresh: Fresh episodes that a formula has to judge rightly, but for a share of 1 - ζ, for collecting to end; at
             least `positives` of them good.
-        patience: Good episodes that are enough to say that no number of copies of the structure is satisfying.
+        patience: Good episodes that are enough to go on with other structures where no number of copies of the
+            source's is satisfying. It is taken back if a formula of that structure is found to be right after all.
 
     Raises:
         ConfigurationError: If a number is out of range.
@@ -69,7 +70,7 @@ class LoopSettings:
     rounds: int = 4
     positives: int = 3
     fresh: int = 30
-    patience: int = 40
+    patience: int = 10
 
     def __post_init__(self) -> None:
         counts = ("batch", "hypotheses", "candidates", "imagined", "rounds", "positives", "fresh", "patience")
@@ -139,18 +140,16 @@ class ClosedLoop:
         episodes: All episodes so far.
         attempts: The formulas that were acted on, in order.
         collected: Episodes until a formula was satisfying on fresh episodes for the first time; None until then.
-        transferable: Whether the formulas have the source's structure, which holds until it is refuted.
-        reason: Why not, in one sentence; empty where it is.
     """
 
     def __init__(self, target: Target, source: SDNF, settings: LoopSettings, rng: np.random.Generator) -> None:
-        self.target, self.settings, self.rng = target, settings, rng
+        self.target, self.source, self.settings, self.rng = target, source, settings, rng
         self.episodes = Episodes(target.problem, target.is_good)
         self.hypotheses = Hypotheses(source, target.space, target.prior, settings.hypotheses, rng)
         self.outcomes = no_counts(target.problem.mdp).outcomes
         self.attempts: list[Attempt] = []
         self.collected: int | None = None
-        self.transferable, self.reason = True, ""
+        self._refuted = ""
         self._acting: Attempt | None = None
         self._learner: Learner = self._model(source)
         self._judged: deque[bool] = deque(maxlen=settings.fresh)
@@ -170,6 +169,17 @@ class ClosedLoop:
     def formula(self) -> SDNF | None:
         """φ^T, the formula that is acted on; None while there is none."""
         return None if self._acting is None else self._acting.formula
+
+    @property
+    def transferable(self) -> bool:
+        """Whether the target's formula has the source's structure (Definition 7), which holds until it is refuted."""
+        formula = self.formula
+        return not self._refuted or (formula is not None and structurally_transferable(formula, self.source))
+
+    @property
+    def reason(self) -> str:
+        """Why it is not transferable, in one sentence; empty where it is."""
+        return "" if self.transferable else self._refuted
 
     def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Go on for some episodes; see `tickwise.rl.learner.Learner`."""
@@ -265,15 +275,13 @@ class ClosedLoop:
             if not self._satisfying:
                 hypotheses.copies, hypotheses.positions, hypotheses.errors = before
         if not self._satisfying and good >= self.settings.patience:
-            if self.transferable:
-                self._give_up()
+            self._refuted = self._refuted or self._refutation()
             self._start_over()
 
-    def _give_up(self) -> None:
-        """The source's structure does not say the target's rule."""
+    def _refutation(self) -> str:
+        """That the source's structure does not say the target's rule."""
         rate, least = 1 - float(self.hypotheses.errors.min()), self.target.settings.rate
-        self.transferable = False
-        self.reason = (
+        return (
             f"Logical transferability is not identified: the best formula of the source's structure judges {rate:.1%} "
             f"of the target's episodes rightly, below the {least:.1%} that are asked for."
         )
