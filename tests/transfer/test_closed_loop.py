@@ -17,7 +17,7 @@ from tickwise.inference.objective import formula_signature
 from tickwise.logic.structure import structurally_transferable
 from tickwise.rl.forms import FORMS
 from tickwise.rl.learner import LearningForm, QLearning
-from tickwise.rl.model import ModelBased
+from tickwise.rl.model import ModelBased, no_counts
 from tickwise.rl.qlearning import QSettings
 from tickwise.transfer import closed_loop
 from tickwise.transfer.closed_loop import ClosedLoop, LoopSettings
@@ -83,6 +83,20 @@ def test_a_satisfying_formula_is_found_and_the_optimum_is_near(name: str):
     assert share_of_the_optimum(loop) > (0.85 if name == "keep" else 0.95)
     assert len(loop.problem.memory.start) == loop.problem.mdp.n_states
     assert loop.q.shape == (loop.problem.memory.n_states, loop.problem.mdp.n_states, 3)
+
+
+def test_while_nothing_is_acted_on_the_policy_is_that_of_the_hypothesis_that_agrees_best():
+    loop, rng = EITHER.loop(1), np.random.default_rng(1)
+    while not loop.episodes.good.any() or len(loop.episodes) % loop.settings.batch:
+        loop.learn(rng, 1)
+    assert loop.formula is None
+    best = loop.hypotheses.formula(loop.hypotheses.best[0])
+    wanted = loop.target.extended(best)
+    assert loop.problem.task is loop.target.problem.task
+    before = loop.q.copy()
+    values = ModelBased().learner(wanted, counts=no_counts(wanted.mdp)._replace(outcomes=loop.outcomes))
+    values.recount(loop.episodes.paths)
+    np.testing.assert_array_equal(before, values.q)
 
 
 def test_copies_are_joined_where_one_does_not_do():

@@ -18,6 +18,7 @@ from tickwise.errors import ConfigurationError, DataError
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.growth import infer_jointly
 from tickwise.inference.hypotheses import Hypotheses
+from tickwise.inference.neighbours import neighbours
 from tickwise.inference.objective import formula_signature
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import SearchSpace
@@ -152,18 +153,27 @@ class ClosedLoop:
         self._refuted = ""
         self._acting: Attempt | None = None
         self._learner: Learner = self._model(source)
+        self._guess: Learner | None = None
         self._judged: deque[bool] = deque(maxlen=settings.fresh)
         self._explored = self._failed = self._tried = 0
 
     @property
     def problem(self) -> Problem:
-        """The target task on the extended states of the formula that was acted on last; at first, of the source's."""
-        return self._learner.problem
+        """The target task on the extended states of the formula acted on, or that would be if one had to be now."""
+        return self._best_so_far.problem
 
     @property
     def q(self) -> NDArray[np.float32]:
         """The values on these states, shape ``(memory states, states, actions)``."""
-        return self._learner.q
+        return self._best_so_far.q
+
+    @property
+    def _best_so_far(self) -> Learner:
+        if self._acting is not None:
+            return self._learner
+        if self._guess is None:
+            self._guess = self._rewarded(self.hypotheses.formula(self.hypotheses.best[0]))
+        return self._guess
 
     @property
     def formula(self) -> SDNF | None:
@@ -201,7 +211,7 @@ class ClosedLoop:
             plan, table = self._most_probable()
             played = plan.play(rng, table)
         self.episodes.add(*played)
-        self._explored += 1
+        self._explored, self._guess = self._explored + 1, None
         if self._explored % self.settings.batch == 0:
             self.hypotheses.update(*self.episodes.labelled())
             self._infer()
@@ -295,10 +305,18 @@ class ClosedLoop:
             fit = infer_jointly(data, self.target.prior, self.target.space, balanced, limits)
         except DataError:  # nothing tells them apart; more episodes may
             return
-        space, prior = self.target.space, self.target.prior
-        self.hypotheses = Hypotheses(fit.formula, space, prior, self.settings.hypotheses, self.rng)
-        self.hypotheses.positions[0] = space.encode(fit.formula)
-        self.hypotheses.update(*self.episodes.labelled(), self.settings.rounds)
+        self.hypotheses = self._around(fit.formula)
+        if not self._satisfying:  # then an operator may be another: the search that found it was not to its end
+            found = [self.hypotheses, *map(self._around, neighbours(fit.formula))]
+            self.hypotheses = min(found, key=lambda each: float(each.errors.min()))
+
+    def _around(self, formula: SDNF) -> Hypotheses:
+        """Hypotheses of a formula's structure, itself one of them at first."""
+        target, (data, weights) = self.target, self.episodes.labelled()
+        found = Hypotheses(formula, target.space, target.prior, self.settings.hypotheses, self.rng)
+        found.positions[0] = target.space.encode(formula)
+        found.update(data, weights, 3 * self.settings.rounds)
+        return found
 
     def _most_sure(self) -> SDNF:
         """Of the hypotheses that agree best, the one whose plan for the rewards most of them accept."""
@@ -337,7 +355,7 @@ class ClosedLoop:
             mdp, fallback = problem.mdp, float(np.median(before.q))
             q = transfer_q(mdp, before.problem.memory, before.q, mdp, problem.memory, fallback)
             self._learner = form.learner(problem, q)
-        self._acting = Attempt(formula, len(self.episodes))
+        self._acting, self._guess = Attempt(formula, len(self.episodes)), None
         self.attempts.append(self._acting)
         self._judged.clear()
 
