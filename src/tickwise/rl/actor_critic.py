@@ -135,7 +135,7 @@ def learn_as_actor_and_critic(
     paths: NDArray[np.int32],
 ) -> None:
     """The loop of `ActorCritic`; the rest is as in `tickwise.rl.loop.run_episodes`."""
-    horizon, delta = world[9], world[11]
+    horizon, delta, letters = world[9], world[11], world[12]
     actions = preferences.shape[2]
     steps = np.empty((horizon, 2), dtype=np.uint32)
     shares = np.empty((horizon, actions))
@@ -147,8 +147,8 @@ def learn_as_actor_and_critic(
         for t in range(1, horizon + 1):
             step = _index(t - 1)
             action = _index(draw_softly(preferences, u, s, temperature, uniform(stream), shares[step]))
-            letter, next_s, w, gained, over = advance(world, t, s, w, action, uniform(stream))
-            next_u = _index(delta[u, letter])
+            outcome, next_s, w, gained, over = advance(world, t, s, w, action, uniform(stream))
+            next_u = _index(delta[u, _index(letters[s, action, outcome])])
             surprise = gained - values[u, s]
             if not over:
                 surprise += gamma * values[next_u, next_s]

@@ -190,7 +190,8 @@ def learn_counterfactually(
             row = _index(row + letters)
             action = _index(draw_action(q, u, s, best, epsilon, uniform(stream)))
             option = _index(choice[s, action])
-            letter, next_s, w, gained, over = advance(world, t, s, w, action, uniform(stream))
+            outcome, next_s, w, gained, over = advance(world, t, s, w, action, uniform(stream))
+            letter = _index(world[12][s, action, outcome])
             next_u = _index(delta[u, letter])
             best = best_value(q, next_u, next_s)
             target = gained if over else gained + gamma * best

@@ -61,11 +61,9 @@ def advance(world: Any, t: int, s: Index, w: Index, action: Index, number: float
     """Go to tick t; the number in [0, 1) draws the outcome.
 
     Returns:
-        The memory's letter, the next state, the next task state, the reward, and whether the episode is over.
+        The outcome, the next state, the next task state, the reward, and whether the episode is over.
     """
-    _, successor, thresholds, _, task_delta, task_letter, reward, final_reward, terminated, horizon, _, _, letter = (
-        world
-    )
+    _, successor, thresholds, _, task_delta, task_letter, reward, final_reward, terminated, horizon, _, _, _ = world
     outcome = _index(0)
     while outcome < successor.shape[2] - 1 and number >= thresholds[s, action, outcome]:
         outcome = _index(outcome + 1)
@@ -74,7 +72,7 @@ def advance(world: Any, t: int, s: Index, w: Index, action: Index, number: float
     gained = np.float64(reward[next_w, next_s])
     if t == horizon:
         gained += final_reward[next_w]
-    return _index(letter[s, action, outcome]), next_s, next_w, gained, terminated[next_w] or t == horizon
+    return outcome, next_s, next_w, gained, terminated[next_w] or t == horizon
 
 
 @njit

@@ -8,7 +8,6 @@ what the automaton says on arriving; a formula that says what is rewarded makes 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.errors import ConfigurationError
 from tickwise.rl.learner import check_form, first_values
+from tickwise.rl.loop import run_episodes
 from tickwise.rl.planning import CLASSES, Counts, imagine, plan, play
 from tickwise.rl.qlearning import Problem
 from tickwise.rl.stream import put_back, take_stream
@@ -156,14 +156,7 @@ class ModelLearner:
             raise ConfigurationError(
                 f"the table to play has shape {table.shape}; use that of the plan, {self._q.shape}"
             )
-        paths = np.empty((1, self.problem.task.horizon + 1), np.int32)
-        stream = take_stream(rng)
-        arguments: tuple[Any, ...] = (
-            *self.problem.arrays, self.unrolled.verdict, stream, table, self.counts, paths[0],
-        )  # fmt: skip
-        total = play(*arguments)
-        put_back(rng, stream)
-        return np.array([total], np.float32), paths
+        return run_episodes(play, self.problem, (self.unrolled.verdict, table, self.counts), rng, 1)
 
     def recount(self, paths: NDArray[np.int32]) -> None:
         """Count rewards and ends by what this memory's automaton says, from episodes that were had with another.

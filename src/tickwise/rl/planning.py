@@ -6,13 +6,13 @@ first for a tie of actions and the second for the outcome.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tickwise._jit import njit
-from tickwise.rl.kernels import draw_state
+from tickwise.rl.loop import advance, begin
 from tickwise.rl.stream import uniform
 
 _index = np.uint32
@@ -53,60 +53,37 @@ def greedy_action(values: NDArray[np.float32], number: float) -> int:
 
 @njit
 def play(
-    start_thresholds: NDArray[np.float64],
-    successor: NDArray[np.int32],
-    thresholds: NDArray[np.float64],
-    task_start: NDArray[np.int32],
-    task_delta: NDArray[np.int32],
-    task_letter: NDArray[np.int32],
-    reward: NDArray[np.float32],
-    final_reward: NDArray[np.float32],
-    terminated: NDArray[np.bool_],
-    horizon: int,
-    memory_start: NDArray[np.int32],
-    memory_delta: NDArray[np.int32],
-    memory_letter: NDArray[np.int32],
+    world: Any,
     verdict: NDArray[np.int8],
-    stream: NDArray[np.uint64],
     q: NDArray[np.float32],
     counts: Counts,
-    path: NDArray[np.int32],
-) -> float:
-    """Play one episode greedily, ties at random, and count what is met; gives the undiscounted return.
+    stream: NDArray[np.uint64],
+    returns: NDArray[np.float32],
+    paths: NDArray[np.int32],
+) -> None:
+    """Play episodes greedily, ties at random, and count what is met.
 
-    ``path``, shape ``(horizon + 1,)``, is filled with the MDP states and -1 after the end. ``verdict`` is that of
-    `tickwise.rl.unrolled.Unrolled`; the rest is the problem's arrays, see `tickwise.rl.kernels.q_learning`.
+    ``verdict`` is that of `tickwise.rl.unrolled.Unrolled`; for the rest see `tickwise.rl.loop.run_episodes`.
     """
-    outcomes = successor.shape[2]
-    path[:] = -1
-    s = _index(draw_state(start_thresholds, uniform(stream)))
-    w = _index(task_start[s])
-    u = _index(memory_start[s])
-    path[0] = s
-    total = 0.0
-    for t in range(1, horizon + 1):
-        action = greedy_action(q[u, s], uniform(stream))
-        chance = uniform(stream)
-        outcome = _index(0)
-        while outcome < outcomes - 1 and chance >= thresholds[s, action, outcome]:
-            outcome = _index(outcome + 1)
-        counts.outcomes[s, action, outcome] += 1
-        u = _index(memory_delta[u, _index(memory_letter[s, action, outcome])])
-        s = _index(successor[s, action, outcome])
-        w = _index(task_delta[w, _index(task_letter[s])])
-        gained = np.float64(reward[w, s])
-        if t == horizon:
-            gained += final_reward[w]
-        total += gained
-        over = terminated[w] or t == horizon
-        kind = 2 * (verdict[u] + 1) + (t == horizon)
-        counts.rewards[kind, s] += gained
-        counts.arrivals[kind, s] += 1
-        counts.ends[kind, s] += over
-        path[t] = s
-        if over:
-            break
-    return total
+    horizon, delta, letters = world[9], world[11], world[12]
+    for episode in range(len(returns)):
+        u, s, w = begin(world, stream)
+        paths[episode, 0] = s
+        total = 0.0
+        for t in range(1, horizon + 1):
+            action = _index(greedy_action(q[u, s], uniform(stream)))
+            outcome, next_s, w, gained, over = advance(world, t, s, w, action, uniform(stream))
+            counts.outcomes[s, action, outcome] += 1
+            u, s = _index(delta[u, _index(letters[s, action, outcome])]), next_s
+            kind = 2 * (verdict[u] + 1) + (t == horizon)
+            counts.rewards[kind, s] += gained
+            counts.arrivals[kind, s] += 1
+            counts.ends[kind, s] += over
+            total += gained
+            paths[episode, t] = s
+            if over:
+                break
+        returns[episode] = total
 
 
 @njit

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.rl.kernels import q_learning
 from tickwise.rl.learner import check_form, first_values
+from tickwise.rl.loop import run_episodes
 from tickwise.rl.qlearning import Problem, QSettings
-from tickwise.rl.stream import put_back, take_stream
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,13 +101,11 @@ class TrustingLearner:
     def learn(self, rng: np.random.Generator, episodes: int) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Learn for some episodes; see `tickwise.rl.learner.Learner`."""
         settings = self.form.settings
-        returns = np.empty(episodes, dtype=np.float32)
-        paths = np.empty((episodes, self.problem.task.horizon + 1), dtype=np.int32)
-        stream = take_stream(rng)
-        arguments: tuple[Any, ...] = (
-            *self.problem.arrays, float(settings.alpha), float(settings.gamma), float(settings.epsilon), stream,
-            self.q, returns, paths, self.visits, self.confidence, float(self.form.patience),
-        )  # fmt: skip
-        q_learning(*arguments)
-        put_back(rng, stream)
-        return returns, paths
+        rates = float(settings.alpha), float(settings.gamma), float(settings.epsilon)
+        trust = self.visits, self.confidence, float(self.form.patience)
+
+        def kernel(world: tuple[Any, ...], stream: Any, returns: Any, paths: Any) -> None:
+            arguments: tuple[Any, ...] = (*world, *rates, stream, self.q, returns, paths, *trust)
+            q_learning(*arguments)
+
+        return run_episodes(kernel, self.problem, (), rng, episodes)
