@@ -16,6 +16,7 @@ from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.inference.tree import InferenceSettings
 from tickwise.library.entry import Entry
 from tickwise.library.handover import transfer, transferred_values
+from tickwise.library.outlook import Outlook
 from tickwise.library.ranking import Ranking, distance, numbers_of, rank
 from tickwise.library.target import Target, cells_space
 from tickwise.logic.parse import parse
@@ -26,6 +27,7 @@ from tickwise.rl.states import automaton_memory
 from tickwise.transfer.hypothesis import tick_tables
 from tickwise.transfer.promise import greedy_success, promise
 from tickwise.transfer.qtransfer import transfer_q
+from tickwise.transfer.rehearsal import Goal
 
 NEW = "F[0,5] (1 <= x <= 2 & 0 <= y <= 2) & F[7,12] (4 <= x <= 5 & 2 <= y <= 4)"
 """The new task, in a world of 5 × 5 cells: the learned one, a cell further on."""
@@ -34,6 +36,9 @@ MIRRORED = "F[0,5] (3 <= x <= 4 & 0 <= y <= 2) & F[7,12] (0 <= x <= 1 & 2 <= y <
 """The learned one with the regions at the opposite sides of its world."""
 
 SWARM = SwarmSettings(particles=40, iterations=40, restarts=1, stall=10, climbers=4)
+
+GOAL = Goal(level=0.8, most=20_000)
+"""What is learned steadily in these worlds."""
 
 
 def sdnf(text: str) -> SDNF:
@@ -48,7 +53,7 @@ def fit_of(text: str) -> Fit:
 def target(size: int = 4) -> Target:
     mdp = GridWorld(5).mdp()
     settings = InferenceSettings(size=size, rate=0.97)
-    return Target.in_world(walks(NEW, mdp), mdp, TICKS, settings, SWARM)
+    return Target.in_world(walks(NEW, mdp), mdp, TICKS, settings, SWARM, goal=GOAL)
 
 
 def entries() -> list[Entry]:
@@ -118,19 +123,20 @@ def test_what_remains_of_regions_and_windows_by_hand():
 def test_an_entry_for_its_own_task():
     """Nothing is moved, so what is promised is what was learned, and nothing differs."""
     entry = learned()
-    own = Target.in_world(walks(REACH, entry.mdp), entry.mdp, TICKS)
-    found = numbers_of(entry, fit_of(REACH), own, entry.formula)
+    own = Target.in_world(walks(REACH, entry.mdp), entry.mdp, TICKS, goal=Goal(level=0.8))
+    found = numbers_of(entry, fit_of(REACH), Outlook(own, entry.formula))
     assert (found.dissimilarity, found.distance) == (0, 0)
     problem = problem_of(REACH, entry.mdp)
     assert found.promise == pytest.approx(greedy_success(problem, entry.q))
     success = (evaluate(problem, entry.q, np.random.SeedSequence(0), 20_000) + 10) / 110  # returns are 100 or -10
     assert found.promise == pytest.approx(success, abs=0.01)
     assert found.promise > 0.5
+    assert found.rehearsal == 0
 
 
 def test_the_numbers_are_those_of_their_modules():
     entry, known = learned(), target()
-    found = numbers_of(entry, fit_of(NEW), known, sdnf(NEW))
+    found = numbers_of(entry, fit_of(NEW), Outlook(known, sdnf(NEW)))
     memory = automaton_memory(known.mdp, tick_tables(sdnf(NEW), TICKS))
     q = transfer_q(entry.mdp, entry.memory(), entry.q, known.mdp, memory, SETTINGS.initial)
     assert found.promise == promise(sdnf(NEW), TICKS, known.mdp, memory, q)
@@ -140,7 +146,7 @@ def test_the_numbers_are_those_of_their_modules():
 
 def test_another_arrangement_by_hand():
     entry, known = learned("mirrored", MIRRORED), target()
-    found = numbers_of(entry, fit_of(NEW), known, sdnf(NEW))
+    found = numbers_of(entry, fit_of(NEW), Outlook(known, sdnf(NEW)))
     # sides in x differ by -2, -2, 4 and 4, of which 3 remain; those in y and the times are the same
     assert found.distance == pytest.approx((3 / 5 + 0 + 0) / 3)
     # laid over one another by -2, as least as can be, the second region would lie outside the world
@@ -165,7 +171,8 @@ def test_what_was_learned_in_the_same_structure_comes_first():
     assert first.fit.formula == second.fit.formula == ranking().task.formula
     assert first.numbers.promise > second.numbers.promise
     assert first.numbers.dissimilarity == second.numbers.dissimilarity
-    assert first.why.startswith("With its values the greedy policy satisfies the task's formula in ")
+    assert first.numbers.rehearsal < second.numbers.rehearsal
+    assert first.why.startswith("Its values need about ")
     assert "and with blank " in first.why
     assert "and with reach " in second.why
     assert ranking().best is first
@@ -201,7 +208,9 @@ def test_other_numbers_give_another_order():
         assert [each.entry.name for each in found.ranked] == ["near", "mirrored"]
         assert found.order == order
     for order in ((), ("luck",)):
-        with pytest.raises(ConfigurationError, match=r"cannot be ranked by .*; use promise, dissimilarity, distance"):
+        with pytest.raises(
+            ConfigurationError, match=r"cannot be ranked by .*; use rehearsal, promise, dissimilarity, distance"
+        ):
             rank([learned()], target(), order)
 
 
@@ -217,7 +226,8 @@ def test_without_a_world_nothing_is_promised():
     data = target().task.data
     known = Target.of_data(data, InferenceSettings(rate=0.9), SWARM)
     found = rank([learned()], known)
-    assert found.best.numbers.promise is None
+    assert (found.best.numbers.promise, found.best.numbers.rehearsal) == (None, None)
+    assert (found.without, found.warning) == (None, None)
     assert 0 <= found.best.numbers.dissimilarity <= 1
     assert found.best.why.startswith("No other entry is transferable; its formula, moved onto the task's, disagrees")
     with pytest.raises(ConfigurationError, match="none is known of the new task; name one"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -48,8 +49,10 @@ Size = Annotated[int | None, typer.Option(min=1, help="The most primitives, ϱ_t
 Rate = Annotated[float | None, typer.Option(help="The least classification rate, ζ (the study's, or 0.95).")]
 Weight = Annotated[float | None, typer.Option(min=0, help="The weight of the information gain, λ (0.01).")]
 Search = Annotated[str, typer.Option(help=_SEARCH)]
-By = Annotated[str | None, typer.Option(help="promise, dissimilarity or distance.", autocompletion=completion.numbers)]
-Seed = Annotated[int, typer.Option(min=0, help="The seed of the fits, and of a random pair.")]
+By = Annotated[
+    str | None, typer.Option(help="rehearsal, promise, dissimilarity or distance.", autocompletion=completion.numbers)
+]
+Seed = Annotated[int, typer.Option(min=0, help="The seed of fits and rehearsals, and of a random pair.")]
 
 
 @command
@@ -162,10 +165,12 @@ def rank(
     """Rank what a library has by how promising a beginning it is for a new task.
 
     To each structure in the library a formula is fitted; entries whose structure does not fit are refused, with the
-    reason. Without --study or --world nothing is known of where the trajectories are from, and nothing is promised.
+    reason. With --study or --world the task is rehearsed there: the entry is best whose values it is learned from in
+    the fewest episodes, and where that is no gain over learning without them, a warning says so.
     For example: tickwise library rank tasks logs.npz --study case1
     """
     from tickwise.library.folder import Library
+    from tickwise.library.standing import episodes
 
     known = Library.open(folder)
     target = _target(data, study, world, horizon, size, rate, information_weight, search, seed)
@@ -175,9 +180,13 @@ def rank(
         return
     if found.task is not None:
         output.print(f"task: {found.task.formula} (classification rate {found.task.rate:.4f})")
+    if found.without is not None:
+        took = episodes(found.without, found.goal.most)
+        output.print(f"without transfer: {took} to {100 * found.goal.level:g} % of the best in a rehearsal")
+    _warn(found)
     rows = [(each.entry.name, each.why, *_numbers(each)) for each in found.ranked]
-    rows += [(each.entry.name, f"Refused: {each.why}", "", "", "") for each in found.refused]
-    show_rows(("name", "why", "promise", "dissimilarity", "distance"), rows, numbers=2)
+    rows += [(each.entry.name, f"Refused: {each.why}", "", "", "", "") for each in found.refused]
+    show_rows(("name", "why", "rehearsal", "promise", "dissimilarity", "distance"), rows, numbers=2)
 
 
 @command
@@ -199,6 +208,7 @@ def transfer(
 ) -> None:
     """Transfer the Q-function of the best entry, or of a named one, to a new task, whose world has to be known.
 
+    Where no gain is foreseen, it is transferred all the same, with a warning.
     Python goes on from it: tickwise.library.entry_files.read_entry("start.npz") has q and memory().
     For example: tickwise library transfer tasks logs.npz start.npz --study case1
     """
@@ -213,13 +223,15 @@ def transfer(
         raise ConfigurationError("values are transferred into a world; name it with --study or --world")
     sources = [known.read(each) for each in ([entry] if entry is not None else known.names())]
     target = _target(data, study, world, horizon, size, rate, information_weight, search, seed)
-    best = _ranking(sources, target, by).best
+    found = _ranking(sources, target, by)
+    best = found.best
     arrays, manifest = write_entry(out, hand_over(best.entry, best.fit, target, name))
     if as_json:
-        print_json({"npz": str(arrays), "json": str(manifest), **_ranked_document(best)})
+        print_json({"npz": str(arrays), "json": str(manifest), **_ranked_document(best), **_rehearsed_document(found)})
         return
     output.print(f"from {best.entry.name}: {best.fit.formula}")
     output.print(best.why)
+    _warn(found)
     output.print(f"Q-function: {arrays}, with {manifest.name}")
 
 
@@ -262,8 +274,10 @@ def _target(
     mdp = None if world is None else read_world(world)
     known = read_trajectories(data)
     if spec is not None:
-        ticks, strategy = spec.target.task.deadline, spec.learning.disjunct
-        return Target.in_world(known, spec.target.mdp(), ticks, settings, how, disjunct=strategy, seed=seed)
+        return Target.in_world(
+            known, spec.target.mdp(), spec.target.task.deadline, settings, how,
+            disjunct=spec.learning.disjunct, form=spec.learning.form("IV"), seed=seed,
+        )  # fmt: skip
     if mdp is not None:
         return Target.in_world(known, mdp, horizon or known.horizon, settings, how, seed=seed)
     return Target.of_data(known, settings, how, seed=seed)
@@ -275,21 +289,33 @@ def _ranking(entries: Sequence[Entry], target: Target, by: str | None) -> Rankin
 
     order = ORDER if by is None else tuple(dict.fromkeys((by, *ORDER)))
     with busy("fitting formulas ...") as say:
-        return ranked(entries, target, order, lambda done, of: say(f"fitting structure {done + 1} of {of} ..."))
+        return ranked(entries, target, order, lambda what, done, of: say(f"{what} {done + 1} of {of} ..."))
+
+
+def _warn(found: Ranking) -> None:
+    if found.warning is not None:
+        output.print(f"warning: {found.warning}")
 
 
 def _numbers(each: Ranked) -> tuple[str, ...]:
-    numbers = (each.numbers.promise, each.numbers.dissimilarity, each.numbers.distance)
-    return tuple("" if number is None else f"{number:.4f}" for number in numbers)
+    """The cells of an entry's numbers: whole episodes, and shares."""
+    rehearsed, *shares = asdict(each.numbers).values()
+    first = "" if rehearsed is None else f"{rehearsed:,.0f}"
+    return (first, *("" if share is None else f"{share:.4f}" for share in shares))
 
 
 def _ranked_document(each: Ranked) -> dict[str, Any]:
     return {
         "name": each.entry.name, "formula": str(each.entry.formula), "fitted": str(each.fit.formula),
-        "rate": each.fit.rate, "gain": each.fit.gain, "promise": each.numbers.promise,
-        "dissimilarity": each.numbers.dissimilarity, "distance": each.numbers.distance, "why": each.why,
+        "rate": each.fit.rate, "gain": each.fit.gain, **asdict(each.numbers), "why": each.why,
         "provenance": dict(each.entry.provenance),
     }  # fmt: skip
+
+
+def _rehearsed_document(found: Ranking) -> dict[str, Any]:
+    """What the first entry's rehearsal is held against."""
+    goal = found.goal
+    return {"without": found.without, "level": goal.level, "most": goal.most, "warning": found.warning}
 
 
 def _ranking_document(found: Ranking) -> dict[str, Any]:
@@ -297,6 +323,7 @@ def _ranking_document(found: Ranking) -> dict[str, Any]:
     return {
         "task": None if task is None else {"formula": str(task.formula), "rate": task.rate, "gain": task.gain},
         "order": list(found.order),
+        **_rehearsed_document(found),
         "ranked": [_ranked_document(each) for each in found.ranked],
         "refused": [
             {"name": each.entry.name, "formula": str(each.entry.formula), "why": each.why} for each in found.refused

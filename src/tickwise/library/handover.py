@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.errors import ConfigurationError
 from tickwise.inference.fit import Fit
 from tickwise.library.entry import Entry, centroids, stamped
 from tickwise.library.target import Target
 from tickwise.logic.sdnf import SDNF
-from tickwise.rl.states import Memory, automaton_memory, disjunct_choice
-from tickwise.transfer.hypothesis import tick_tables
+from tickwise.rl.states import Memory
 from tickwise.transfer.qtransfer import transfer_q
 
 
@@ -31,15 +29,11 @@ def transferred_values(entry: Entry, formula: SDNF, target: Target) -> tuple[Mem
         DataError: If the worlds' actions, coordinates or orientations differ in number.
         AutomatonError: If φ^T is not structurally transferable from the entry's formula.
     """
-    if target.mdp is None:
-        raise ConfigurationError("values are transferred into a world, and none is known of the new task; name one")
-    tables = tick_tables(formula, target.horizon)
-    memory = automaton_memory(target.mdp, tables, disjunct_choice(target.disjunct))
-    source = entry.memory()
+    world, memory, source = target.world, target.memory(formula), entry.memory()
     # a start, before the first letter, is where nothing is learned: it has the value that learning began with
     initial = float(entry.q[source.offsets[0], 0, 0])
-    places = entry.landmarks, centroids(formula, target.mdp)
-    return memory, transfer_q(entry.mdp, source, entry.q, target.mdp, memory, initial, places)
+    places = entry.landmarks, centroids(formula, world)
+    return memory, transfer_q(entry.mdp, source, entry.q, world, memory, initial, places)
 
 
 def transfer(entry: Entry, fit: Fit, target: Target, name: str) -> Entry:
@@ -66,11 +60,10 @@ def transfer(entry: Entry, fit: Fit, target: Target, name: str) -> Entry:
         AutomatonError: If φ^T is not structurally transferable from the entry's formula.
     """
     _, q = transferred_values(entry, fit.formula, target)
-    assert target.mdp is not None  # or there were no values
     return Entry(
         name=name,
         formula=fit.formula,
-        mdp=target.mdp,
+        mdp=target.world,
         horizon=target.horizon,
         q=q,
         disjunct=target.disjunct,

@@ -15,11 +15,16 @@ from tickwise.inference.space import SearchSpace
 from tickwise.inference.template import TransferFit, fit_transferable
 from tickwise.library.entry import Entry
 from tickwise.library.handover import transferred_values
-from tickwise.library.standing import ORDER, Numbers, key_of, reason_of
+from tickwise.library.outlook import Outlook
+from tickwise.library.standing import ORDER, Numbers, key_of, reason_of, warning_of
 from tickwise.library.target import Target
 from tickwise.logic.alignment import align, aligned
 from tickwise.logic.sdnf import SDNF
-from tickwise.transfer.promise import promise
+from tickwise.transfer.promise import greedy_success
+from tickwise.transfer.rehearsal import Goal
+
+Report = Callable[[str, int, int], None]
+"""Is told what is done, such as ``fitting structure``, how many of it are done, and of how many."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +66,25 @@ class Ranking:
         refused: The others.
         task: The new task's formula, of those fitted the one with the greatest J; None where none is satisfying.
         order: By which numbers they are ranked.
+        without: Episodes of learning in the model of the world without transferred values, which those of the entries'
+            `Numbers.rehearsal` are held against; None where no world is known or no entry is transferable.
+        goal: What had to be reached in a rehearsal; one that did not get there counts with the goal's most episodes.
     """
 
     ranked: tuple[Ranked, ...]
     refused: tuple[Refused, ...]
     task: Fit | None
     order: tuple[str, ...]
+    without: float | None
+    goal: Goal
+
+    @property
+    def warning(self) -> str | None:
+        """Why the first had better not be transferred, in one sentence; None where a gain is foreseen, or no world."""
+        if not self.ranked:
+            return None
+        first = self.ranked[0]
+        return warning_of(first.entry.name, first.numbers, self.without, self.goal.most)
 
     @property
     def best(self) -> Ranked:
@@ -86,19 +104,20 @@ def rank(
     entries: Iterable[Entry],
     target: Target,
     order: Sequence[str] = ORDER,
-    report: Callable[[int, int], None] | None = None,
+    report: Report | None = None,
 ) -> Ranking:
     """Rank entries by how promising a beginning they are for a new task.
 
     To each structure among the entries a formula is fitted as in Step 2 of Section IV-B; entries whose structure gives
     no satisfying formula are refused. Structures that say little may give one, too, which is then easily satisfied. So
     all that are left are measured by the same formula, the most convincing of those fitted, which has the greatest J.
+    Where a world is known, this formula is learned in it from each entry's values, and once without any.
 
     Args:
         entries: The entries.
         target: The new task.
         order: By which `Numbers` they are ranked.
-        report: Told how many structures are fitted, and of how many.
+        report: Told how far it is.
 
     Returns:
         The entries, in order.
@@ -118,15 +137,18 @@ def rank(
             found.append((entry, outcome.attempts[-1]))
     best = max((fit for _, fit in found), key=lambda fit: fit.objective, default=None)
     measured: list[tuple[Entry, Fit, Numbers]] = []
-    for entry, fit in found:
-        try:
-            measured.append((entry, fit, numbers_of(entry, fit, target, (best or fit).formula)))
-        except (DataError, ConfigurationError) as error:  # worlds that differ in kind
-            refused.append(Refused(entry, f"It cannot be transferred: {error}."))
+    without, goal = None, target.goal
+    if best is not None:
+        outlook = Outlook(target, best.formula)
+        measured, failed = _measured(found, outlook, report)
+        refused += failed
+        if measured and target.mdp is not None:
+            without, goal = outlook.without, outlook.goal
     measured.sort(key=lambda row: key_of(row[2], order))
     every = [(entry.name, numbers) for entry, _, numbers in measured]
-    ranked = tuple(Ranked(*row, reason_of(place, every, order)) for place, row in enumerate(measured))
-    return Ranking(ranked, tuple(sorted(refused, key=lambda each: each.entry.name)), best, tuple(order))
+    ranked = tuple(Ranked(*row, reason_of(place, every, order, goal.most)) for place, row in enumerate(measured))
+    refused.sort(key=lambda each: each.entry.name)
+    return Ranking(ranked, tuple(refused), best, tuple(order), without, goal)
 
 
 def distance(source: SDNF, target: SDNF, space: SearchSpace) -> float:
@@ -167,15 +189,13 @@ def _suitable(entries: Iterable[Entry], target: Target) -> tuple[list[Entry], li
     return left, refused
 
 
-def _fits(
-    entries: Sequence[Entry], target: Target, report: Callable[[int, int], None] | None
-) -> list[TransferFit | str]:
+def _fits(entries: Sequence[Entry], target: Target, report: Report | None) -> list[TransferFit | str]:
     """What Step 2 gives for each entry's structure, or why it cannot be fitted; each structure is fitted once."""
     structures = {_structure(entry.formula): entry.formula for entry in entries}
     fits: dict[str, TransferFit | str] = {}
     for key, formula in structures.items():
         if report is not None:
-            report(len(fits), len(structures))
+            report("fitting structure", len(fits), len(structures))
         task, rng = target.task, generator(target.seed, "library", key)
         try:
             fits[key] = fit_transferable(
@@ -184,6 +204,21 @@ def _fits(
         except ConfigurationError as error:
             fits[key] = f"It cannot be fitted: {error}."
     return [fits[_structure(entry.formula)] for entry in entries]
+
+
+def _measured(
+    found: Sequence[tuple[Entry, Fit]], outlook: Outlook, report: Report | None
+) -> tuple[list[tuple[Entry, Fit, Numbers]], list[Refused]]:
+    """How promising each entry is, and those that cannot be transferred after all."""
+    measured, refused = [], []
+    for done, (entry, fit) in enumerate(found):
+        if report is not None:
+            report("measuring entry", done, len(found))
+        try:
+            measured.append((entry, fit, numbers_of(entry, fit, outlook)))
+        except (DataError, ConfigurationError) as error:  # worlds that differ in kind
+            refused.append(Refused(entry, f"It cannot be transferred: {error}."))
+    return measured, refused
 
 
 def _structure(formula: SDNF) -> str:
@@ -195,24 +230,26 @@ def _structure(formula: SDNF) -> str:
     return " | ".join(parts)
 
 
-def numbers_of(entry: Entry, fit: Fit, target: Target, task: SDNF) -> Numbers:
+def numbers_of(entry: Entry, fit: Fit, outlook: Outlook) -> Numbers:
     """How promising a beginning an entry is.
 
     Args:
         entry: The entry.
         fit: The formula of its structure that was fitted to the new task, which its values are transferred by.
-        target: The new task.
-        task: The formula that is to be satisfied.
+        outlook: The new task, and the formula that is to be satisfied.
 
     Raises:
         DataError: If the worlds' actions, coordinates or orientations differ in number.
+        ConfigurationError: If a region contains no cell of the world, or the formula's table would be too large.
     """
-    promised = None
+    target, rehearsed, promised = outlook.target, None, None
     if target.mdp is not None:
         memory, q = transferred_values(entry, fit.formula, target)
-        promised = promise(task, target.horizon, target.mdp, memory, q)
+        problem = outlook.problem(memory)
+        rehearsed, promised = outlook.rehearsal(problem, q), greedy_success(problem, q)
     return Numbers(
+        rehearsal=rehearsed,
         promise=promised,
-        dissimilarity=dissimilarity(aligned(entry.formula, fit.formula), task, target.task.prior),
+        dissimilarity=dissimilarity(aligned(entry.formula, fit.formula), outlook.formula, target.task.prior),
         distance=distance(entry.formula, fit.formula, target.task.space),
     )

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-ORDER = ("promise", "dissimilarity", "distance")
+ORDER = ("rehearsal", "promise", "dissimilarity", "distance")
 """By which numbers entries are ranked: the first decides, the next where it ties or is not known, and so on.
 
 This is the one place that says so. ``promise`` is better the greater it is, the others the smaller they are.
 """
 
 _PHRASES = {
+    "rehearsal": "its values need {} to learn the task's formula in the model of the world",
     "promise": (
         "with its values the greedy policy satisfies the task's formula in {} of episodes before anything is learned"
     ),
@@ -24,9 +26,11 @@ _DIGITS = 9  # what differs further behind is rounding
 
 @dataclass(frozen=True, slots=True)
 class Numbers:
-    """How promising an entry is, in three ways.
+    """How promising an entry is, in four ways.
 
     Attributes:
+        rehearsal: The mean number of episodes that it takes to learn the new task's formula from the transferred
+            Q-function in the model of the world (see `tickwise.transfer.rehearsal`); None where no world is known.
         promise: The probability that the greedy policy of the transferred Q-function satisfies the new task's formula
             (see `tickwise.transfer.promise`); None where no world is known.
         dissimilarity: How often the entry's formula, moved onto the one that was fitted, and the new task's formula
@@ -35,6 +39,7 @@ class Numbers:
             `tickwise.library.ranking.distance`).
     """
 
+    rehearsal: float | None
     promise: float | None
     dissimilarity: float
     distance: float
@@ -52,20 +57,21 @@ def _cost(numbers: Numbers, name: str) -> float:
     return round(-value if name == "promise" else value, _DIGITS)
 
 
-def reason_of(place: int, ranked: Sequence[tuple[str, Numbers]], order: Sequence[str]) -> str:
+def reason_of(place: int, ranked: Sequence[tuple[str, Numbers]], order: Sequence[str], most: float = math.inf) -> str:
     """Why an entry stands where it stands: the number that decides between it and its neighbour, in one sentence.
 
     Args:
         place: Its place, from 0.
         ranked: Names and numbers of all, in order.
         order: By which numbers they are ranked.
+        most: Episodes that a rehearsal had at most.
 
     Returns:
         The sentence; that of the first compares with the second, that of any other with the one before.
     """
     numbers = ranked[place][1]
     if len(ranked) == 1:
-        said = next((said for name in order if (said := _said(name, numbers))), "it is alone")
+        said = next((said for name in order if (said := _said(name, numbers, most))), "it is alone")
         return _sentence(f"no other entry is transferable; {said}")
     other, theirs = ranked[place - 1 if place else 1]
     ours = key_of(numbers, order)
@@ -74,23 +80,56 @@ def reason_of(place: int, ranked: Sequence[tuple[str, Numbers]], order: Sequence
         return _sentence(f"it has the same numbers as {other}, and the names decide")
     ties = [name for name in order[: order.index(deciding)] if getattr(numbers, name) is not None]
     tied = f"its {' and '.join(ties)} {'is that' if len(ties) == 1 else 'are those'} of {other}, but " if ties else ""
-    digits = _digits(getattr(numbers, deciding), getattr(theirs, deciding))
-    said = _said(deciding, numbers, digits)
-    return _sentence(f"{tied}{said}, and with {other} {_percent(getattr(theirs, deciding), digits)}")
+    value = getattr(theirs, deciding)
+    digits = _digits(deciding, getattr(numbers, deciding), value, most)
+    said = _said(deciding, numbers, most, digits)
+    return _sentence(f"{tied}{said}, and with {other} {_text(deciding, value, most, digits)}")
 
 
-def _said(name: str, numbers: Numbers, digits: int = 3) -> str:
+def warning_of(name: str, numbers: Numbers, without: float | None, most: float) -> str | None:
+    """Why an entry's values had better not be transferred, in one sentence.
+
+    Args:
+        name: The entry's name.
+        numbers: Its numbers.
+        without: Episodes of a rehearsal without transferred values; None where no world is known.
+        most: Episodes that a rehearsal had at most.
+
+    Returns:
+        The sentence; None where a gain is foreseen, or no world is known.
+    """
+    ours = numbers.rehearsal
+    if ours is None or without is None or ours < without:
+        return None
+    if without >= most:
+        return (
+            f"Nothing is foreseen of {name}, and its other numbers rank it: within {most:,} episodes the task's "
+            "formula was learned in the model of the world neither from its values nor without any."
+        )
+    return (
+        f"No gain is foreseen from {name}: its values need {episodes(ours, most)} to learn the task's formula in the "
+        f"model of the world, and without any it takes {episodes(without, most)}."
+    )
+
+
+def episodes(number: float, most: float, digits: int = 3) -> str:
+    """What a rehearsal took, in words: of one that did not get there only the least is known."""
+    return f"at least {most:,} episodes" if number >= most else f"about {number:,.{digits - 3}f} episodes"
+
+
+def _said(name: str, numbers: Numbers, most: float, digits: int = 3) -> str:
     value = getattr(numbers, name)
-    return "" if value is None else _PHRASES[name].format(_percent(value, digits))
+    return "" if value is None else _PHRASES[name].format(_text(name, value, most, digits))
 
 
-def _percent(share: float, digits: int) -> str:
-    return f"{100 * share:.{digits}g} %"
+def _text(name: str, value: float, most: float, digits: int) -> str:
+    return episodes(value, most, digits) if name == "rehearsal" else f"{100 * value:.{digits}g} %"
 
 
-def _digits(ours: float, theirs: float) -> int:
-    """As many digits as tell two shares apart."""
-    return next((d for d in range(3, _DIGITS) if _percent(ours, d) != _percent(theirs, d)), _DIGITS)
+def _digits(name: str, ours: float, theirs: float, most: float) -> int:
+    """As many digits as tell two numbers apart."""
+    apart = (d for d in range(3, _DIGITS) if _text(name, ours, most, d) != _text(name, theirs, most, d))
+    return next(apart, _DIGITS)
 
 
 def _sentence(text: str) -> str:

@@ -15,7 +15,11 @@ from tickwise.inference.space import SearchSpace
 from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.trajectories import LabelledTrajectories
 from tickwise.inference.tree import InferenceSettings, Search
-from tickwise.transfer.hypothesis import Task
+from tickwise.logic.sdnf import SDNF
+from tickwise.rl.learner import LearningForm, QLearning
+from tickwise.rl.states import Memory, automaton_memory, disjunct_choice
+from tickwise.transfer.hypothesis import Task, tick_tables
+from tickwise.transfer.rehearsal import Goal
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,11 +29,13 @@ class Target:
     Attributes:
         task: Its trajectories, prior and space of parameters.
         horizon: The length L of an episode, in ticks.
-        mdp: Its world, or a model of it; None where none is known, so that nothing can be promised or transferred.
+        mdp: Its world, or a model of it; None where none is known, so that nothing can be foreseen or transferred.
         settings: When a formula is satisfying (Problem 1).
         search: How parameters are fitted.
         disjunct: The strategy that chooses the disjunct (see `tickwise.rl.states.DISJUNCT_CHOICES`).
-        seed: The seed of the fits.
+        form: The form of learning that goes on from what is transferred, and that is rehearsed.
+        goal: When the task counts as learned in a rehearsal, or at a lower level (see `tickwise.library.outlook`).
+        seed: The seed of the fits and of the rehearsals.
     """
 
     task: Task
@@ -38,7 +44,28 @@ class Target:
     settings: InferenceSettings = field(default_factory=InferenceSettings)
     search: Search = field(default_factory=SwarmSettings)
     disjunct: str = "nearest_centroid"
+    form: LearningForm = field(default_factory=QLearning)
+    goal: Goal = field(default_factory=Goal)
     seed: int = 0
+
+    @property
+    def world(self) -> TabularMDP:
+        """The world.
+
+        Raises:
+            ConfigurationError: If none is known.
+        """
+        if self.mdp is None:
+            raise ConfigurationError("values are transferred into a world, and none is known of the new task; name one")
+        return self.mdp
+
+    def memory(self, formula: SDNF) -> Memory:
+        """The extended states of a formula in the world.
+
+        Raises:
+            ConfigurationError: If no world is known.
+        """
+        return automaton_memory(self.world, tick_tables(formula, self.horizon), disjunct_choice(self.disjunct))
 
     @classmethod
     def in_world(
@@ -50,6 +77,8 @@ class Target:
         search: Search | None = None,
         *,
         disjunct: str = "nearest_centroid",
+        form: LearningForm | None = None,
+        goal: Goal | None = None,
         seed: int = 0,
     ) -> Target:
         """A task in a world that is known, or estimated (see `tickwise.envs.estimation`).
@@ -63,7 +92,9 @@ class Target:
             settings: When a formula is satisfying; by default as for `tickwise infer`.
             search: How parameters are fitted; by default by the paper's swarm.
             disjunct: The strategy that chooses the disjunct.
-            seed: The seed of the fits.
+            form: The form of learning; by default Q-learning with the default settings.
+            goal: When the task counts as learned in a rehearsal; by default as `Goal` has it.
+            seed: The seed of the fits and of the rehearsals.
 
         Raises:
             ConfigurationError: If the horizon is less than 1.
@@ -79,7 +110,10 @@ class Target:
         _check_places(known, mdp)
         prior = PathPrior(mdp.support_graph(), mdp.coordinates, mdp.variables, horizon)
         task = Task(known, prior, cells_space(mdp, horizon))
-        return cls(task, horizon, mdp, settings or InferenceSettings(), search or SwarmSettings(), disjunct, seed)
+        return cls(
+            task, horizon, mdp, settings or InferenceSettings(), search or SwarmSettings(), disjunct,
+            form or QLearning(), goal or Goal(), seed,
+        )  # fmt: skip
 
     @classmethod
     def of_data(

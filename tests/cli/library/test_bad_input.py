@@ -1,4 +1,4 @@
-"""Libraries of learned tasks on the command line."""
+"""What the library's commands cannot do is said in one line, and leaves nothing behind."""
 
 from __future__ import annotations
 
@@ -13,180 +13,13 @@ import pytest
 
 from tests.cli.test_bad_input import FORMULA, a_folder, table
 from tests.experiments.test_store import files, no_room
-from tests.experiments.tiny import TINY
-from tests.library.learned import REACH, learned, walks
-from tests.library.test_ranking import MIRRORED, NEW
+from tests.library.learned import REACH, learned
 from tests.test_cli import Tickwise
 from tickwise.cli.library import library as group
-from tickwise.envs.gridworld import GridWorld
-from tickwise.experiments.inferences import labelled_data
-from tickwise.experiments.learned import learned_entry
-from tickwise.experiments.store import Store, read_json
-from tickwise.inference.reading import write_npz
-from tickwise.library.entry_files import read_entry
 from tickwise.library.folder import Library
 from tickwise.library.worlds import write_world
-from tickwise.rl.qlearning import Problem, QSettings, evaluate, learn
 
 pytestmark = pytest.mark.usefixtures("studies")
-
-
-@pytest.fixture(scope="module")
-def tasks(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A library of two entries; not to be changed."""
-    folder = tmp_path_factory.mktemp("library") / "tasks"
-    for entry in (learned(), learned("mirrored", MIRRORED)):
-        Library.open(folder, create=True).add(entry)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def new(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Trajectories of a new task, and its world beside them."""
-    folder = tmp_path_factory.mktemp("new")
-    mdp = GridWorld(5).mdp()
-    write_npz(folder / "logs.npz", walks(NEW, mdp))
-    write_world(folder / "world.npz", mdp)
-    return folder / "logs.npz"
-
-
-def of_study(finished: Path, folder: Path) -> Path:
-    """The trajectories of the tiny study's target task."""
-    path = folder / "target.npz"
-    write_npz(path, labelled_data(TINY, Store.open(finished, TINY.as_dict()), "target", 0))
-    return path
-
-
-# ---------------------------------------------------------------- the whole loop
-
-
-def test_from_a_run_to_learning_in_another_task(tickwise: Tickwise, finished: Path, tmp_path: Path):
-    """What was learned in the source task is added, ranked for the target task, transferred, and learned on."""
-    folder, data, start = tmp_path / "tasks", of_study(finished, tmp_path), tmp_path / "start.npz"
-    added = tickwise("library", "add", folder, "tiny", "--run", finished)
-    assert (added.status, added.err) == (0, "")
-    assert added.out == f"added tiny to {folder}: {Library.open(folder).read('tiny').formula}\n"
-    ranked = tickwise("library", "rank", folder, data, "--study", "tiny", "--json").document
-    assert [each["name"] for each in ranked["ranked"]] == ["tiny"]
-    assert ranked["refused"] == []
-    assert ranked["ranked"][0]["why"].startswith("No other entry is transferable; with its values the greedy policy")
-    made = tickwise("library", "transfer", folder, data, start, "--study", "tiny")
-    assert (made.status, made.err) == (0, "")
-    assert made.out.splitlines()[0] == f"from tiny: {ranked['ranked'][0]['fitted']}"
-    assert made.out.splitlines()[-1] == f"Q-function: {start}, with start.json"
-
-    entry = read_entry(start)
-    assert entry.provenance["from"] == "tiny"
-    assert entry.provenance["source"]["folder"] == str(finished)
-    problem = Problem(entry.mdp, TINY.target.task_table(), entry.memory())
-    settings, seed = QSettings(initial=60.0), np.random.SeedSequence(0)
-    fresh, warm = problem.initial_q(settings), entry.q.copy()
-    assert evaluate(problem, warm, seed, 500) > evaluate(problem, fresh, seed, 500)
-    means = [learn(problem, q, settings, np.random.default_rng(0), 2_000).mean() for q in (fresh, warm)]
-    assert means[1] > means[0]
-    # what was learned on is an entry, too
-    np.save(tmp_path / "q.npy", warm)
-    write_world(tmp_path / "world.npz", entry.mdp)
-    own = ("--formula", entry.formula, "--q", tmp_path / "q.npy", "--world", tmp_path / "world.npz", "--horizon", 14)
-    again = tickwise("library", "add", folder, "tiny-target", *own)
-    assert again.status == 0
-    assert Library.open(folder).names() == ("tiny", "tiny-target")
-
-
-def test_where_a_run_is_from_is_kept(finished: Path):
-    entry = learned_entry(finished, "tiny")
-    store = Store.open(finished, TINY.as_dict())
-    returns = [store.load(f"learn-source-{run}")["evaluation_returns"][-1] for run in range(2)]
-    run = int(np.argmax(returns))
-    origin = {key: value for key, value in entry.provenance.items() if key not in ("version", "date")}
-    assert origin == {
-        "folder": str(finished), "study": "tiny", "task": "source", "method": "source", "protocol": "paper", "seed": 0,
-        "run": run, "runs": 2, "episodes": 30_000, "mean_return": float(max(returns)),
-        "made_by": read_json(finished / "environment.json")["version"],
-    }  # fmt: skip
-    np.testing.assert_array_equal(entry.q, store.load(f"learn-source-{run}")["q"])
-    inferred = store.load("infer-0")["source"]
-    assert str(entry.formula) == inferred["formula"]
-    assert entry.facts["rate"] == inferred["rate"]
-    assert entry.facts["positives"] == store.load("collect-source-0")["positives"]
-
-
-# ---------------------------------------------------------------- what each command says
-
-
-def test_list_as_a_table_and_as_a_document(tickwise: Tickwise, tasks: Path):
-    lines = tickwise("library", "list", tasks).out.splitlines()
-    assert lines[0].split("\t") == ["name", "from", "episodes", "mean return", "rate", "added", "formula"]
-    *cells, added, formula = lines[1].split("\t")
-    assert (cells, formula) == (["mirrored", "", "20,000", "", "1"], MIRRORED)
-    assert re.fullmatch(r"\d{4}-\d\d-\d\d", added)
-    document = tickwise("library", "list", tasks, "--json").document
-    assert document["folder"] == str(tasks)
-    assert [each["name"] for each in document["entries"]] == ["mirrored", "reach"]
-    first = document["entries"][1]
-    assert first["formula"] == REACH
-    assert first["world"] == {"states": 64, "actions": 3, "variables": ["x", "y"]}
-    assert first["facts"] == {"rate": 1.0, "size": 2}
-    assert first["provenance"].keys() == {"version", "date", "episodes"}
-    assert first["checksum"].startswith("sha256:")
-
-
-def test_an_empty_library_lists_nothing(tickwise: Tickwise, tmp_path: Path):
-    Library.open(tmp_path / "tasks", create=True)
-    assert tickwise("library", "list", tmp_path / "tasks", "--json").document["entries"] == []
-    assert len(tickwise("library", "list", tmp_path / "tasks").out.splitlines()) == 1
-
-
-def test_rank_as_a_table_and_as_a_document(tickwise: Tickwise, tasks: Path, new: Path):
-    asked = ("library", "rank", tasks, new, "--world", new.with_name("world.npz"))
-    document = tickwise(*asked, "--json").document
-    assert document["order"] == ["promise", "dissimilarity", "distance"]
-    assert [each["name"] for each in document["ranked"]] == ["reach", "mirrored"]
-    first, second = document["ranked"]
-    assert first["promise"] > second["promise"]
-    assert first["distance"] < second["distance"]
-    assert document["task"]["formula"] == first["fitted"]
-    lines = tickwise(*asked).out.splitlines()
-    assert lines[0] == f"task: {first['fitted']} (classification rate {first['rate']:.4f})"
-    assert lines[1].split("\t") == ["name", "why", "promise", "dissimilarity", "distance"]
-    for line, each in zip(lines[2:], document["ranked"], strict=True):
-        numbers = [f"{each[key]:.4f}" for key in ("promise", "dissimilarity", "distance")]
-        assert line.split("\t") == [each["name"], each["why"], *numbers]
-
-
-def test_rank_by_another_number_and_without_a_world(tickwise: Tickwise, tasks: Path, new: Path):
-    found = tickwise("library", "rank", tasks, new, "--by", "distance", "--rate", 0.9, "--json").document
-    assert found["order"] == ["distance", "promise", "dissimilarity"]
-    assert [each["promise"] for each in found["ranked"]] == [None, None]
-    assert found["ranked"][0]["distance"] <= found["ranked"][1]["distance"]
-
-
-def test_what_is_refused_is_listed_with_the_reason(tickwise: Tickwise, tasks: Path, new: Path):
-    asked = ("library", "rank", tasks, new, "--world", new.with_name("world.npz"), "--size", 1)
-    document = tickwise(*asked, "--json").document
-    assert (document["task"], document["ranked"]) == (None, [])
-    assert {each["why"] for each in document["refused"]} == {
-        "The source's formula has size 2, more than the 1 that are allowed."
-    }
-    lines = tickwise(*asked).out.splitlines()
-    assert lines[1].startswith("mirrored\tRefused: The source's formula has size 2")
-
-
-def test_transfer_from_a_named_entry(tickwise: Tickwise, tasks: Path, new: Path, tmp_path: Path):
-    asked = ("library", "transfer", tasks, new, tmp_path / "start.npz", "--world", new.with_name("world.npz"))
-    best = tickwise(*asked, "--json").document
-    assert (best["name"], best["npz"], best["json"]) == (
-        "reach",
-        str(tmp_path / "start.npz"),
-        str(tmp_path / "start.json"),
-    )
-    assert read_entry(tmp_path / "start.npz").provenance["from"] == "reach"
-    assert tickwise(*asked, "--entry", "mirrored", "--json").document["name"] == "mirrored"
-    assert read_entry(tmp_path / "start.npz").provenance["from"] == "mirrored"
-    assert files(tmp_path) == {"start.npz", "start.json"}
-
-
-# ---------------------------------------------------------------- bad input
 
 
 def own(folder: Path, **changes: object) -> tuple[object, ...]:
@@ -324,7 +157,7 @@ BAD: dict[str, tuple[Callable[[Given], tuple[object, ...]], str]] = {
     ),
     "a number that is none": (
         lambda g: ("rank", g.tasks, g.new, "--by", "luck"),
-        "entries cannot be ranked by luck, .*; use promise, dissimilarity, distance",
+        "entries cannot be ranked by luck, .*; use rehearsal, promise, dissimilarity, distance",
     ),
     "a rate above 1": (
         lambda g: ("rank", g.tasks, g.new, "--rate", "1.5"),
