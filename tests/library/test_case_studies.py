@@ -54,7 +54,8 @@ def test_a_target_task_finds_its_source(study: str, tmp_path: Path):
     _, collected = compute(Job("collect", "target", 0), spec, Parcel({}), lambda *_: None)
     data = labelled_data(spec, Parcel({collected.name: collected}), "target", 0)
     mdp, ticks = spec.target.mdp(), spec.target.task.deadline
-    target = Target.in_world(data, mdp, ticks, spec.inference, spec.swarm, disjunct=spec.learning.disjunct)
+    strategy, form = spec.learning.disjunct, spec.learning.form("IV")
+    target = Target.in_world(data, mdp, ticks, spec.inference, spec.swarm, disjunct=strategy, form=form)
     found = rank([library.read(name) for name in library.names()], target)
     assert found.best.entry.name == study
 

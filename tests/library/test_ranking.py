@@ -229,7 +229,7 @@ def test_without_a_world_nothing_is_promised():
     assert (found.best.numbers.promise, found.best.numbers.rehearsal) == (None, None)
     assert (found.without, found.warning) == (None, None)
     assert 0 <= found.best.numbers.dissimilarity <= 1
-    assert found.best.why.startswith("No other entry is transferable; its formula, moved onto the task's, disagrees")
+    assert found.best.why.startswith("No other entry is ranked; its formula, moved onto the task's, disagrees")
     with pytest.raises(ConfigurationError, match="none is known of the new task; name one"):
         transfer(found.best.entry, found.best.fit, known, "mine")
 

@@ -53,7 +53,7 @@ def test_the_greater_promise_and_the_smaller_others_come_first():
         (1, (B, B), ORDER, "It has the same numbers as the first, and the names decide."),
         (
             0, (A,), ("distance",),
-            "No other entry is transferable; once moved, its regions and windows differ from the fitted ones by 3.1 % "
+            "No other entry is ranked; once moved, its regions and windows differ from the fitted ones by 3.1 % "
             "of the world and the episode.",
         ),
         (
@@ -63,10 +63,10 @@ def test_the_greater_promise_and_the_smaller_others_come_first():
         ),
         (
             0, (FAST,), ORDER,
-            "No other entry is transferable; its values need about 1,240 episodes to learn the task's formula in the "
+            "No other entry is ranked; its values need about 1,240 episodes to learn the task's formula in the "
             "model of the world.",
         ),
-        (0, (Numbers(None, None, 0.25, 0.1),), ("rehearsal",), "No other entry is transferable; it is alone."),
+        (0, (Numbers(None, None, 0.25, 0.1),), ("rehearsal",), "No other entry is ranked; it is alone."),
     ],
 )  # fmt: skip
 def test_why_in_one_sentence(place: int, ranked: tuple[Numbers, ...], order: tuple[str, ...], said: str):

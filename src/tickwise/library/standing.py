@@ -72,7 +72,7 @@ def reason_of(place: int, ranked: Sequence[tuple[str, Numbers]], order: Sequence
     numbers = ranked[place][1]
     if len(ranked) == 1:
         said = next((said for name in order if (said := _said(name, numbers, most))), "it is alone")
-        return _sentence(f"no other entry is transferable; {said}")
+        return _sentence(f"no other entry is ranked; {said}")
     other, theirs = ranked[place - 1 if place else 1]
     ours = key_of(numbers, order)
     deciding = next((name for name, a, b in zip(order, ours, key_of(theirs, order), strict=True) if a != b), None)

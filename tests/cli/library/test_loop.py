@@ -26,7 +26,7 @@ def test_from_a_run_to_learning_in_another_task(tickwise: Tickwise, finished: Pa
     ranked = tickwise("library", "rank", folder, data, "--study", "tiny", "--json").document
     assert [each["name"] for each in ranked["ranked"]] == ["tiny"]
     assert ranked["refused"] == []
-    assert ranked["ranked"][0]["why"].startswith("No other entry is transferable; its values need about ")
+    assert ranked["ranked"][0]["why"].startswith("No other entry is ranked; its values need about ")
     made = tickwise("library", "transfer", folder, data, start, "--study", "tiny")
     assert (made.status, made.err) == (0, "")
     assert made.out.splitlines()[0] == f"from tiny: {ranked['ranked'][0]['fitted']}"
