@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from tickwise._seeding import generator, seed_sequence
-from tickwise.envs.planning import optimal_value
+from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError
 from tickwise.experiments.artefacts import Artefacts
+from tickwise.experiments.course import learning_course
 from tickwise.experiments.inferences import satisfying_source, search_space, uniform_prior
 from tickwise.experiments.job import Job, Outcome, Report
-from tickwise.experiments.measures import block_means, goal_reached
 from tickwise.experiments.study import StudySpec
-from tickwise.rl.qlearning import Problem, evaluate
+from tickwise.rl.qlearning import Problem
 from tickwise.rl.states import disjunct_choice, tau_memory
 from tickwise.transfer.closed_loop import Attempt, ClosedLoop, Target
 from tickwise.transfer.episodes import good_return, unbroken
@@ -27,32 +23,18 @@ def learn_in_closed_loop(job: Job, spec: StudySpec, store: Artefacts, report: Re
     Raises:
         ConfigurationError: If no satisfying formula of the source task was inferred.
     """
-    learning = spec.learning
     loop = closed_loop(spec, store, job.run)
-    rng = generator(spec.seed, spec.name, "learn", "V", job.run)
-    fixed = seed_sequence(spec.seed, spec.name, "evaluate")
-    episodes, step = learning.most_episodes["V"], learning.loop_steps
-    values = [evaluate(loop.problem, loop.q, fixed, learning.evaluation_episodes)]
-    points = [0]
-    while points[-1] < episodes:
-        report(points[-1], episodes)
-        loop.learn(rng, min(step, episodes - points[-1]))
-        points.append(len(loop.episodes))
-        values.append(evaluate(loop.problem, loop.q, fixed, learning.evaluation_episodes))
-    returns, good = loop.episodes.returns, loop.episodes.good
-    arrays: dict[str, NDArray[Any]] = {
-        "blocks": block_means(returns, learning.block),
-        "evaluation_episodes": np.array(points, dtype=np.int64),
-        "evaluation_returns": np.array(values, dtype=np.float64),
-    }
-    optimum = optimal_value(loop.target.problem.mdp, loop.target.problem.task)
+    episodes = spec.learning.most_episodes["V"]
+    points = [*range(0, episodes, spec.learning.loop_steps), episodes]
+    course = learning_course(job, spec, loop, points, report)
+    good = loop.episodes.good
     facts = {
-        "run": job.run, "episodes": episodes, "goal": goal_reached(returns, learning.goal, optimum),
-        "collected": loop.collected, "first_good": int(good.argmax()) + 1 if good.any() else None,
+        **course.manifest, "collected": loop.collected,
+        "first_good": int(good.argmax()) + 1 if good.any() else None,
         "formula": None if loop.formula is None else str(loop.formula), "transferable": loop.transferable,
         "reason": loop.reason, "attempts": [_attempt(attempt) for attempt in loop.attempts],
     }  # fmt: skip
-    return Outcome(facts, arrays)
+    return Outcome(facts, course.arrays)
 
 
 def closed_loop(spec: StudySpec, store: Artefacts, run: int) -> ClosedLoop:

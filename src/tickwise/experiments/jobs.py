@@ -5,26 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise._seeding import generator, seed_sequence
-from tickwise.envs.planning import optimal_value
+from tickwise._seeding import generator
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.experiments.artefacts import Artefact, Artefacts
 from tickwise.experiments.closing import learn_in_closed_loop
+from tickwise.experiments.course import learning_course
 from tickwise.experiments.inferences import infer, study_formulas
 from tickwise.experiments.job import Job, Outcome, Report
-from tickwise.experiments.measures import block_means, goal_reached
 from tickwise.experiments.memory import peak_memory_mib
-from tickwise.experiments.recording import Recorder, recording_points
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import Collection, StudySpec, environment_of
 from tickwise.rl.learner import Learner, QLearning
-from tickwise.rl.qlearning import Problem, collect, evaluate
+from tickwise.rl.qlearning import Problem, collect
 from tickwise.rl.states import automaton_memory, disjunct_choice, tau_memory
 from tickwise.rl.trusting import Trusting, TrustingLearner
 from tickwise.transfer.hypothesis import tick_tables
@@ -169,32 +166,13 @@ def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outco
         learner = _transferred(job, spec, store, problem)
     else:
         learner = learning.form(subject).learner(problem)
-    rng = generator(spec.seed, spec.name, "learn", subject, job.run)
-    fixed = seed_sequence(spec.seed, spec.name, "evaluate")
     episodes = learning.source_episodes if subject == "source" else learning.most_episodes[subject]
-    points = evaluation_points(spec, episodes)
-    recorder = Recorder(learner.problem, fixed, recording_points(points))
-    values = [evaluate(learner.problem, learner.q, fixed, learning.evaluation_episodes)]
-    recorder.look(0, learner.q)
-    parts = []
-    for before, now in pairwise(points):
-        report(before, episodes)
-        parts.append(learner.learn(rng, now - before)[0])
-        values.append(evaluate(learner.problem, learner.q, fixed, learning.evaluation_episodes))
-        recorder.look(now, learner.q)
-    returns = np.concatenate(parts)
-    arrays: dict[str, NDArray[Any]] = {
-        "blocks": block_means(returns, learning.block),
-        "evaluation_episodes": np.array(points, dtype=np.int64),
-        "evaluation_returns": np.array(values, dtype=np.float64),
-        **recorder.arrays(),
-    }
+    course = learning_course(job, spec, learner, evaluation_points(spec, episodes), report)
     if subject == "source":
-        arrays["q"] = learner.q
+        course.arrays["q"] = learner.q
         if isinstance(learner, TrustingLearner):
-            arrays["visits"] = learner.visits
-    goal = goal_reached(returns, learning.goal, optimal_value(problem.mdp, problem.task))
-    return Outcome({"run": job.run, "episodes": episodes, "goal": goal}, arrays)
+            course.arrays["visits"] = learner.visits
+    return course
 
 
 def _transferred(job: Job, spec: StudySpec, store: Artefacts, problem: Problem) -> Learner:

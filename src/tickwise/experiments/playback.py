@@ -23,6 +23,7 @@ from tickwise.logic.semantics import holds
 from tickwise.logic.syntax import Box
 
 _FORMULAS = {"I": "target", "II": "target_without_information", "III": "target", "IV": "target", "source": "source"}
+_OWN = PREFIX + "formulas"  # of Method V, which goes from one formula to the next
 _SUBSCRIPTS = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 _SIGNS = {"<": "<", "<=": "≤", ">": ">", ">=": "≥"}
 
@@ -37,7 +38,8 @@ def playback(results: Mapping[str, Any], spec: StudySpec, methods: Mapping[str, 
 
     Returns:
         Plain data: ``tasks``, ``formulas`` and ``methods``, and the names of ``actions`` and ``headings``; None where
-        nothing was recorded, as in run folders of versions that did not record.
+        nothing was recorded, as in run folders of versions that did not record. A method has one of the formulas, or
+        each of its points of learning has its own.
     """
     learned = {name: results["methods"].get(name) or [] for name in methods}
     learned["source"] = results["source_learning"]
@@ -46,14 +48,18 @@ def playback(results: Mapping[str, Any], spec: StudySpec, methods: Mapping[str, 
     if not recorded:
         return None
     tables = {task: environment_of(spec, task).task_table() for task in ("source", "target")}
-    formulas = {name: _formula(results, spec, name) for name in dict.fromkeys(_FORMULAS.values())}
+    formulas = {
+        name: _formula(results["summary"]["formulas"][name], spec, name) for name in dict.fromkeys(_FORMULAS.values())
+    }
+    own = dict.fromkeys(text for name in recorded for run in learned[name] for text in run.get(_OWN, ()))
+    formulas |= {text: _formula(text, spec) for text in own}
     played = []
     for name in recorded:
         task = "source" if name == "source" else "target"
         runs = [run for run in learned[name] if f"{PREFIX}states" in run]
-        key = _FORMULAS[name]
+        key = _FORMULAS.get(name)
         entry: dict[str, Any] = {"key": name, "title": titles[name], "task": task}
-        entry["formula"] = key if formulas[key] else None
+        entry["formula"] = key if key and formulas[key] else None
         entry["follows"] = name != "I"
         entry["runs"] = [{"run": run["run"] + 1, "points": _points(run, tables[task])} for run in runs]
         played.append(entry)
@@ -90,13 +96,14 @@ def _points(run: Mapping[str, Any], table: TaskTable) -> list[dict[str, Any]]:
     for index, learned in enumerate(recorded["at"]):
         evaluation = int(np.searchsorted(run["evaluation_episodes"], learned))
         rows = zip(*(recorded[name][index] for name in ("states", "actions", "disjunct", "returns")), strict=True)
-        points.append(
-            {
-                "learned": int(learned),
-                "mean": round(float(run["evaluation_returns"][evaluation]), 1),
-                "episodes": [_episode(table, *row) for row in rows],
-            }
-        )
+        point: dict[str, Any] = {
+            "learned": int(learned),
+            "mean": round(float(run["evaluation_returns"][evaluation]), 1),
+            "episodes": [_episode(table, *row) for row in rows],
+        }
+        if _OWN in run:
+            point["formula"] = run[_OWN][index]
+        points.append(point)
     return points
 
 
@@ -117,13 +124,11 @@ def _episode(
     }  # fmt: skip
 
 
-def _formula(results: Mapping[str, Any], spec: StudySpec, key: str) -> dict[str, Any] | None:
+def _formula(text: str | None, spec: StudySpec, key: str = "target") -> dict[str, Any] | None:
     """A formula with its regions and automata."""
     task = "source" if key == "source" else "target"
     environment = environment_of(spec, task)
-    formula = read_formula(
-        results["summary"]["formulas"][key], task[0].upper(), environment, primed=key == "target_without_information"
-    )
+    formula = read_formula(text, task[0].upper(), environment, primed=key == "target_without_information")
     if formula is None:
         return None
     boxes = list(formula.names)

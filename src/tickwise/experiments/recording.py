@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tickwise.envs.tabulate import draw
+from tickwise.logic.sdnf import SDNF
 from tickwise.rl.qlearning import Problem
 
 SHARES = (0.0, 0.02, 0.1, 1.0)
@@ -42,25 +43,28 @@ class Recorder:
     It draws from the evaluation's seeds only and leaves the Q-table as it is, so that learning does not depend on it.
 
     Attributes:
-        problem: What is learned.
         seed: The seed of the evaluations.
         points: The numbers of learned episodes at which it records; it passes over all others.
+        formulas: The formula whose automata the memory followed at each of them, as text; None for τ-states.
     """
 
-    problem: Problem
     seed: np.random.SeedSequence
     points: Sequence[int]
+    formulas: list[str | None] = field(default_factory=list)
     _parts: list[Mapping[str, NDArray[Any]]] = field(default_factory=list)
 
-    def look(self, learned: int, q: NDArray[np.float32]) -> None:
+    def look(self, learned: int, problem: Problem, q: NDArray[np.float32]) -> None:
         """Record here if this is one of the points.
 
         Args:
             learned: How many episodes were learned.
+            problem: What is learned; from one point to the next its memory may change.
             q: The Q-table, shape ``(memory states, states, actions)``.
         """
         if learned in self.points:
-            self._parts.append({"at": np.array(learned), **greedy_episodes(self.problem, q, self.seed, EPISODES)})
+            conjunctions = tuple(table.automaton.conjunction for table in problem.memory.tables)
+            self.formulas.append(str(SDNF(conjunctions)) if conjunctions else None)
+            self._parts.append({"at": np.array(learned), **greedy_episodes(problem, q, self.seed, EPISODES)})
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What was recorded: the arrays of `greedy_episodes` with a first axis for the points, and `at`."""

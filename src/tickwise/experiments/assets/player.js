@@ -9,7 +9,7 @@ class Player {
     this.timer = null;
     this.tick = 0;
     this.chosen = { method: 0, run: 0, point: 0, episode: 0 };
-    const telling = ["IV", "III", "II", "I", "source"].map((key) => data.methods.findIndex((each) => each.key === key));
+    const telling = ["IV", "V", "III", "II", "I", "source"].map((key) => data.methods.findIndex((each) => each.key === key));
     this.chosen.method = telling.find((index) => index >= 0);
     this.chosen.point = this.points.length - 1;
     const returns = this.points.at(-1).episodes.map((each) => each.return);
@@ -103,7 +103,7 @@ class Player {
     this.chosen.episode = clamp(this.chosen.episode, 0, this.point.episodes.length - 1);
     this.episode = this.drive.episode || this.point.episodes[this.chosen.episode];
     this.task = this.data.tasks[this.method.task];
-    this.formula = this.method.formula && this.data.formulas[this.method.formula];
+    this.formula = this.data.formulas[this.point.formula || this.method.formula] || null;
     this.offer("method", this.data.methods.map(({ title }) => title));
     this.find("choose", "method").title = this.method.title; // a narrow screen cuts it off
     this.offer("run", this.method.runs.map(({ run }) => run));
@@ -119,6 +119,7 @@ class Player {
     this.readFormula();
     this.find("show", "outcome").textContent = this.drive.episode ? this.drive.outcome() : this.outcome();
     this.drive.show();
+    this.find("show", "formula").textContent = this.formula ? this.meaning() : "";
     const { title, runs } = this.method;
     const run = `run ${runs[this.chosen.run].run}, after ${numberText(this.point.learned)} learned episodes`;
     this.find("show", "episode").textContent = `${title}; ${run}, episode ${this.chosen.episode + 1}.`;
@@ -171,6 +172,12 @@ class Player {
     this.find("show", "automata").replaceChildren(...panels, ...notes);
     this.timeline = timeline;
     this.find("show", "timeline").replaceChildren(timeline.element);
+  }
+
+  /** The formula in words, and whose it is where it changes on the way. */
+  meaning() {
+    const guess = this.point.formula ? `, this run’s best guess after ${numberText(this.point.learned)} episodes` : "";
+    return `${this.formula.symbol}${guess}: ${this.formula.english}.`;
   }
 
   outcome() {
