@@ -32,7 +32,7 @@ def test_what_is_recorded_is_what_the_evaluation_plays(finished: Path, subject: 
     q = problem.initial_q(TINY.learning.settings)
     learn(problem, q, TINY.learning.settings, generator(0, "test"), 2_000)
     before = q.copy()
-    found = greedy_episodes(problem, q, FIXED, 30)
+    found = greedy_episodes(problem, q, FIXED, 30, problem.memory)
     np.testing.assert_array_equal(found["returns"], kernel_returns(problem, q, 30))
     np.testing.assert_array_equal(q, before)
     assert len(np.unique(found["returns"])) > 1  # else agreement would say little

@@ -26,7 +26,7 @@ def learn_in_closed_loop(job: Job, spec: StudySpec, store: Artefacts, report: Re
     loop = closed_loop(spec, store, job.run)
     episodes = spec.learning.most_episodes["V"]
     points = [*range(0, episodes, spec.learning.loop_steps), episodes]
-    course = learning_course(job, spec, loop, points, report)
+    course = learning_course(job, spec, loop, lambda: loop.target.extended(loop.assumed).memory, points, report)
     good = loop.episodes.good
     facts = {
         **course.manifest, "collected": loop.collected,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -17,15 +17,24 @@ from tickwise.experiments.recording import PREFIX, Recorder, recording_points
 from tickwise.experiments.study import StudySpec
 from tickwise.rl.learner import Learner
 from tickwise.rl.qlearning import evaluate
+from tickwise.rl.states import Memory
 
 
-def learning_course(job: Job, spec: StudySpec, learner: Learner, points: Sequence[int], report: Report) -> Outcome:
+def learning_course(
+    job: Job,
+    spec: StudySpec,
+    learner: Learner,
+    memory: Callable[[], Memory],
+    points: Sequence[int],
+    report: Report,
+) -> Outcome:
     """Learn to the last of the points, and look at the greedy policy at each of them.
 
     Args:
         job: What learns.
         spec: The study.
         learner: Its learner.
+        memory: Tells the τ-states or extended states that it learns on, without what its form puts into them.
         points: The numbers of episodes after which the greedy policy is evaluated, ascending from 0.
         report: Told of the progress.
 
@@ -36,13 +45,14 @@ def learning_course(job: Job, spec: StudySpec, learner: Learner, points: Sequenc
     learning, episodes = spec.learning, points[-1]
     rng = generator(spec.seed, spec.name, "learn", job.subject, job.run)
     fixed = seed_sequence(spec.seed, spec.name, "evaluate")
-    recorder = Recorder(fixed, recording_points(points))
+    recorder, recorded = Recorder(fixed), recording_points(points)
     values: list[float] = []
 
     def look(learned: int) -> None:
         problem, q = learner.problem, learner.q
         values.append(evaluate(problem, q, fixed, learning.evaluation_episodes))
-        recorder.look(learned, problem, q)
+        if learned in recorded:
+            recorder.record(learned, problem, q, memory())
 
     look(points[0])
     parts = []

@@ -167,7 +167,8 @@ def _learn(job: Job, spec: StudySpec, store: Artefacts, report: Report) -> Outco
     else:
         learner = learning.form(subject).learner(problem)
     episodes = learning.source_episodes if subject == "source" else learning.most_episodes[subject]
-    course = learning_course(job, spec, learner, evaluation_points(spec, episodes), report)
+    points = evaluation_points(spec, episodes)
+    course = learning_course(job, spec, learner, lambda: problem.memory, points, report)
     if subject == "source":
         course.arrays["q"] = learner.q
         if isinstance(learner, TrustingLearner):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tickwise.envs.tabulate import draw
 from tickwise.logic.sdnf import SDNF
 from tickwise.rl.qlearning import Problem
+from tickwise.rl.states import Memory
 
 SHARES = (0.0, 0.02, 0.1, 1.0)
 """The shares of learning after which episodes are recorded: before it, early, later, and at its end."""
@@ -44,27 +45,25 @@ class Recorder:
 
     Attributes:
         seed: The seed of the evaluations.
-        points: The numbers of learned episodes at which it records; it passes over all others.
-        formulas: The formula whose automata the memory followed at each of them, as text; None for τ-states.
+        formulas: The formula that was followed at each recording, as text; None for τ-states.
     """
 
     seed: np.random.SeedSequence
-    points: Sequence[int]
     formulas: list[str | None] = field(default_factory=list)
     _parts: list[Mapping[str, NDArray[Any]]] = field(default_factory=list)
 
-    def look(self, learned: int, problem: Problem, q: NDArray[np.float32]) -> None:
-        """Record here if this is one of the points.
+    def record(self, learned: int, problem: Problem, q: NDArray[np.float32], memory: Memory) -> None:
+        """Record some episodes.
 
         Args:
             learned: How many episodes were learned.
-            problem: What is learned; from one point to the next its memory may change.
+            problem: What is learned; its memory may be another at the next recording.
             q: The Q-table, shape ``(memory states, states, actions)``.
+            memory: The memory whose states are recorded; see `greedy_episodes`.
         """
-        if learned in self.points:
-            conjunctions = tuple(table.automaton.conjunction for table in problem.memory.tables)
-            self.formulas.append(str(SDNF(conjunctions)) if conjunctions else None)
-            self._parts.append({"at": np.array(learned), **greedy_episodes(problem, q, self.seed, EPISODES)})
+        conjunctions = tuple(table.automaton.conjunction for table in memory.tables)
+        self.formulas.append(str(SDNF(conjunctions)) if conjunctions else None)
+        self._parts.append({"at": np.array(learned), **greedy_episodes(problem, q, self.seed, EPISODES, memory)})
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """What was recorded: the arrays of `greedy_episodes` with a first axis for the points, and `at`."""
@@ -73,7 +72,7 @@ class Recorder:
 
 
 def greedy_episodes(
-    problem: Problem, q: NDArray[np.float32], seed: np.random.SeedSequence, episodes: int
+    problem: Problem, q: NDArray[np.float32], seed: np.random.SeedSequence, episodes: int, memory: Memory
 ) -> dict[str, NDArray[Any]]:
     """The first episodes that `tickwise.rl.qlearning.evaluate` plays, tick by tick.
 
@@ -85,13 +84,15 @@ def greedy_episodes(
         q: The Q-table, shape ``(memory states, states, actions)``.
         seed: The seed of the evaluation.
         episodes: How many episodes E.
+        memory: The memory whose states are given, beside that of the problem: a form of learning may put the tick into
+            the states that it learns on, and what is to be seen are the extended states that they stand for.
 
     Returns:
         ``states`` and ``memory`` (the memory's states), int32, shape ``(E, horizon + 1)``, -1 after an episode's end;
         ``actions``, int8, shape ``(E, horizon)``, likewise; ``disjunct``, int16, shape ``(E,)``: the disjunct
         whose automaton the memory follows, -1 for a memory without automata; ``returns``, float32, shape ``(E,)``.
     """
-    task, memory, horizon = problem.task, problem.memory, problem.task.horizon
+    task, own, horizon = problem.task, problem.memory, problem.task.horizon
     starts, successor, thresholds, task_start = problem.arrays[:4]
     rng = np.random.default_rng(seed)
     found: dict[str, NDArray[Any]] = {
@@ -103,20 +104,21 @@ def greedy_episodes(
     }
     for episode in range(episodes):
         s = draw(starts, rng.random())
-        w, u = int(task_start[s]), int(memory.start[s])
+        w, u, v = int(task_start[s]), int(own.start[s]), int(memory.start[s])
         total = 0.0
-        found["states"][episode, 0], found["memory"][episode, 0] = s, u
+        found["states"][episode, 0], found["memory"][episode, 0] = s, v
         if memory.offsets:
-            found["disjunct"][episode] = np.searchsorted(memory.offsets, u, side="right") - 1
+            found["disjunct"][episode] = np.searchsorted(memory.offsets, v, side="right") - 1
         for t in range(1, horizon + 1):
             chance = rng.random()
             action = int(q[u, s].argmax())  # the first of equal ones, as the kernel has it
             outcome = draw(thresholds[s, action], chance)
-            u = int(memory.delta[u, memory.letter[s, action, outcome]])
+            u = int(own.delta[u, own.letter[s, action, outcome]])
+            v = int(memory.delta[v, memory.letter[s, action, outcome]])
             s = int(successor[s, action, outcome])
             w = int(task.delta[w, task.letter[s]])
             total += float(task.reward[w, s]) + (float(task.final_reward[w]) if t == horizon else 0.0)
-            found["states"][episode, t], found["memory"][episode, t] = s, u
+            found["states"][episode, t], found["memory"][episode, t] = s, v
             found["actions"][episode, t - 1] = action
             if task.terminated[w]:
                 break

@@ -74,8 +74,7 @@ class LoopSettings:
     patience: int = 10
 
     def __post_init__(self) -> None:
-        counts = ("batch", "hypotheses", "candidates", "imagined", "rounds", "positives", "fresh", "patience")
-        for name in counts:
+        for name in ("batch", "hypotheses", "candidates", "imagined", "rounds", "positives", "fresh", "patience"):
             if getattr(self, name) < 1:
                 raise ConfigurationError(f"{name} of the closed loop is {getattr(self, name)}; use 1 or more")
         if not 0 <= self.random <= 1:
@@ -158,8 +157,13 @@ class ClosedLoop:
         self._explored = self._failed = self._tried = 0
 
     @property
+    def assumed(self) -> SDNF:
+        """The formula acted on, or that would be if one had to be now."""
+        return self.formula or self.hypotheses.formula(self.hypotheses.best[0])
+
+    @property
     def problem(self) -> Problem:
-        """The target task on the extended states of the formula acted on, or that would be if one had to be now."""
+        """The target task on the extended states of that formula."""
         return self._best_so_far.problem
 
     @property
@@ -172,7 +176,7 @@ class ClosedLoop:
         if self._acting is not None:
             return self._learner
         if self._guess is None:
-            self._guess = self._rewarded(self.hypotheses.formula(self.hypotheses.best[0]))
+            self._guess = self._rewarded(self.assumed)
         return self._guess
 
     @property
@@ -232,11 +236,7 @@ class ClosedLoop:
         return [self.hypotheses.formula(best[row]) for row in rows]
 
     def _mass(
-        self,
-        plan: ModelLearner,
-        among: NDArray[np.float64],
-        episodes: int,
-        table: NDArray[np.float32] | None = None,
+        self, plan: ModelLearner, among: NDArray[np.float64], episodes: int, table: NDArray[np.float32] | None = None
     ) -> float:
         """The share of hypotheses that accept an imagined episode of a plan: how probably it is good."""
         paths = imagined(plan, self.episodes.starts, episodes, self.rng, table)
