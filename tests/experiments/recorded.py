@@ -17,14 +17,20 @@ EVERY_OPERATOR = (
 )
 """All operators, complements, and two disjuncts whose automata differ."""
 
+GUESSES = ("F[1,30] (0 <= x <= 3 & 2 <= y <= 7)", synthetic.TARGET)
+"""What Method V believes at its two points of learning."""
+
 
 def results(spec: StudySpec, formula: str | None = EVERY_OPERATOR, seed: int = 0) -> dict[str, Any]:
-    """Results of a study in which methods I and III have recordings, and the source of method IV too."""
+    """Results of a study in which methods I, III and V have recordings, and the source of method IV too."""
     found = synthetic.results(synthetic.small(spec.runs), formulas=(synthetic.SOURCE, formula, synthetic.PLAIN))
     rng = np.random.default_rng(seed)
     for method in ("I", "III"):
         for run in found["methods"][method]:
             run |= recording(spec.target.world, spec.target.task.deadline, rng, disjunct=-1 if method == "I" else 1)
+    for run in found["methods"]["V"]:
+        run |= recording(spec.target.world, spec.target.task.deadline, rng, disjunct=0)
+        run[PREFIX + "formulas"] = list(GUESSES)
     for run in found["source_learning"]:
         run |= recording(spec.source.world, spec.source.task.deadline, rng, disjunct=0)
     return found

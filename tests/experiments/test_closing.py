@@ -11,20 +11,25 @@ import pytest
 from rich.console import Console
 
 from tests.experiments.tiny import HOPELESS, TINY
+from tickwise.automata.run import EdgeStep
+from tickwise.automata.run import run as run_of
 from tickwise.errors import ConfigurationError
 from tickwise.experiments.closing import closed_loop
 from tickwise.experiments.job import Job
 from tickwise.experiments.jobs import perform
 from tickwise.experiments.progress import Display
+from tickwise.experiments.recording import PREFIX
 from tickwise.experiments.runner import available_methods, run_study
 from tickwise.experiments.store import Store
 from tickwise.experiments.study import StudySpec
 from tickwise.experiments.summary import gather
 from tickwise.logic.parse import parse
+from tickwise.logic.sdnf import to_sdnf
 from tickwise.logic.structure import structurally_transferable
 from tickwise.rl.learner import QLearning
 from tickwise.rl.qlearning import QSettings
 from tickwise.transfer.closed_loop import LoopSettings
+from tickwise.transfer.hypothesis import tick_tables
 
 
 def closed(spec: StudySpec, **more: Any) -> StudySpec:
@@ -53,6 +58,34 @@ def test_the_loop_is_there_within_its_episodes(store: Store):
         assert found["transferable"] != found["reason"].startswith("Logical transferability is not identified")
         assert not found["transferable"] or structurally_transferable(parse(found["formula"]), parse(source))
         assert found["evaluation_returns"].max() >= 90  # V* is nearly 100
+
+
+def test_each_recording_has_the_formula_that_the_loop_had_then(store: Store):
+    for number in range(SPEC.runs):
+        found = store.load(f"learn-V-{number}")
+        assert found[PREFIX + "at"].tolist() == [0, 20, 40, 300]
+        formulas = found[PREFIX + "formulas"]
+        assert formulas[-1] == found["formula"]
+        assert len(set(formulas)) > 1
+        for point, formula in enumerate(formulas):
+            (table,) = tick_tables(to_sdnf(parse(formula)), SPEC.target.task.deadline)
+            memory, states = (found[PREFIX + name][point] for name in ("memory", "states"))
+            assert (found[PREFIX + "disjunct"][point] == 0).all()
+            for path, remembered in zip(SPEC.target.mdp().coordinates[states], memory, strict=True):
+                own = run_of(table.automaton, path, variables=("x", "y"))
+                steps = [step.target for step in own.steps if isinstance(step, EdgeStep)]
+                assert [table.location[u] for u in remembered] == steps
+
+
+def test_what_is_assumed_is_acted_on_once_there_is_enough(store: Store):
+    loop = closed_loop(SPEC, store, 0)
+    rng = np.random.default_rng(3)
+    assert loop.formula is None
+    guess = loop.assumed
+    assert structurally_transferable(guess, loop.source)
+    while loop.formula is None:
+        loop.learn(rng, 1)
+    assert loop.assumed == loop.formula != guess
 
 
 def test_the_summary_counts_every_episode(store: Store):

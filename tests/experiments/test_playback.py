@@ -20,7 +20,7 @@ from tickwise.experiments.summary import gather
 from tickwise.logic.parse import parse
 
 SPEC = synthetic.small()
-METHODS = {"I": "without", "II": "plain", "III": "formula", "IV": "transfer"}
+METHODS = {"I": "without", "II": "plain", "III": "formula", "IV": "transfer", "V": "closed"}
 
 
 @pytest.fixture(scope="module")
@@ -31,13 +31,40 @@ def played() -> dict[str, Any]:
 
 
 def test_what_was_recorded_is_offered(played: dict[str, Any]):
-    assert [method["key"] for method in played["methods"]] == ["I", "III", "source"]
-    tau, extended, source = played["methods"]
+    assert [method["key"] for method in played["methods"]] == ["I", "III", "V", "source"]
+    tau, extended, _, source = played["methods"]
     assert (tau["title"], tau["formula"], tau["follows"]) == ("I: without", "target", False)
     assert (extended["title"], extended["formula"], extended["follows"]) == ("III: formula", "target", True)
     assert (source["task"], source["formula"]) == ("source", "source")
     assert [run["run"] for run in extended["runs"]] == [1, 2, 3]
     assert [point["learned"] for point in extended["runs"][0]["points"]] == [0, 1_000]
+
+
+def test_each_point_of_method_v_has_its_own_formula(played: dict[str, Any]):
+    tau, extended, loop, _ = played["methods"]
+    assert (loop["title"], loop["formula"], loop["follows"]) == ("V: closed", None, True)
+    for run in loop["runs"]:
+        assert [point["formula"] for point in run["points"]] == list(recorded.GUESSES)
+    assert not any(
+        "formula" in point for method in (tau, extended) for run in method["runs"] for point in run["points"]
+    )
+    # a formula that several runs have is there once, beside those of the other methods
+    assert list(played["formulas"]) == ["target", "target_without_information", "source", *recorded.GUESSES]
+    guess, final = (played["formulas"][text] for text in recorded.GUESSES)
+    assert guess["symbol"] == final["symbol"] == "φᵀ"
+    assert len(guess["automata"][0]["parts"]) == 1
+    assert [region["name"] for region in final["regions"]] == ["Ḡᵀ", "Ȳᵀ"]
+
+
+def test_a_run_folder_whose_method_v_did_not_record_plays_the_others():
+    results = recorded.results(SPEC)
+    for run in results["methods"]["V"]:
+        for name in [name for name in run if name.startswith(PREFIX)]:
+            del run[name]
+    data = playback(results, SPEC, METHODS)
+    assert data is not None
+    assert [method["key"] for method in data["methods"]] == ["I", "III", "source"]
+    assert list(data["formulas"]) == ["target", "target_without_information", "source"]
 
 
 def test_it_is_plain_data(played: dict[str, Any]):

@@ -8,7 +8,7 @@ from typing import Any
 
 from tests.browsers import Open
 from tests.experiments import recorded, synthetic
-from tests.experiments.playing import choose, told
+from tests.experiments.playing import choose, told, watch
 from tests.experiments.tiny import TINY
 from tickwise.automata.build import timed_automata
 from tickwise.automata.run import EdgeStep, run
@@ -23,37 +23,6 @@ from tickwise.logic.semantics import verdict
 
 SPEC = synthetic.small()
 DIGITS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
-
-
-def watch(page: Any) -> list[dict[str, Any]]:
-    """Step with the keys' events through the chosen episode, and read at each tick what is to be seen."""
-    ticks = page.evaluate(
-        """() => {
-          const player = document.querySelector(".player");
-          const press = (key) => player.dispatchEvent(new KeyboardEvent("keydown", { key, bubbles: true }));
-          const all = (selector, read) => [...player.querySelectorAll(selector)].map(read);
-          press("Home");
-          const last = Number(player.querySelector("[data-choose=tick]").max);
-          return Array.from({ length: last + 1 }, (_, tick) => {
-            if (tick) press("ArrowRight");
-            return {
-              tick: Number(player.dataset.tick),
-              locations: JSON.parse(player.dataset.locations),
-              clocks: JSON.parse(player.dataset.clocks),
-              verdicts: all(".lane-text[data-verdict]", (x) => Number(x.dataset.verdict)),
-              literals: all(".literal", (x) => ["is-false", "is-open", "is-true"].indexOf(x.classList[1]) - 1),
-              shown: all(".clock", (x) => x.textContent),
-              current: all(".location.current .name", (x) => x.textContent),
-              taken: all(".edge.taken", (x) => x.getAttribute("d")).length,
-              lit: all(".region", (x) => x.classList.contains("lit")),
-              world: player.querySelector(".map > title").textContent,
-              robot: player.querySelector(".robot").style.transform,
-            };
-          });
-        }"""
-    )
-    assert [seen["tick"] for seen in ticks] == list(range(len(ticks)))
-    return list(ticks)
 
 
 def test_the_automata_run_as_the_semantics_say(opened: Open, results: dict[str, Any]):
@@ -149,7 +118,7 @@ def test_regions_light_up_with_the_robot_in_them(opened: Open, results: dict[str
 def test_every_method_run_and_episode_can_be_chosen(opened: Open):
     page = opened()
     titles = page.locator("[data-choose=method] option").all_text_contents()
-    assert [title.split(":")[0] for title in titles] == ["I", "III", "source task"]
+    assert [title.split(":")[0] for title in titles] == ["I", "III", "V", "source task"]
     seen = set()
     for change in (
         {"method": "I", "run": "1", "point": "0 ", "episode": "1"}, {"method": "III"}, {"method": "source"},
@@ -200,7 +169,7 @@ def test_keys_do_all_that_buttons_do(opened: Open):
     page.keyboard.press("+")
     assert page.locator("[data-choose=speed]").input_value() == "8"
     page.keyboard.press("-")
-    for key, name, values in ((".", "episode", 2), ("[", "point", 2), ("m", "method", 3), ("r", "run", 3)):
+    for key, name, values in ((".", "episode", 2), ("[", "point", 2), ("m", "method", 4), ("r", "run", 3)):
         select = page.locator(f"[data-choose={name}]")
         first = select.input_value()
         page.keyboard.press(key)

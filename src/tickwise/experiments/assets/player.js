@@ -9,7 +9,7 @@ class Player {
     this.timer = null;
     this.tick = 0;
     this.chosen = { method: 0, run: 0, point: 0, episode: 0 };
-    const telling = ["IV", "V", "III", "II", "I", "source"].map((key) => data.methods.findIndex((each) => each.key === key));
+    const telling = ["IV", "III", "V", "II", "I", "source"].map((key) => data.methods.findIndex((each) => each.key === key));
     this.chosen.method = telling.find((index) => index >= 0);
     this.chosen.point = this.points.length - 1;
     const returns = this.points.at(-1).episodes.map((each) => each.return);
