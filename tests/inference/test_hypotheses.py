@@ -227,6 +227,32 @@ def test_growing_a_source_of_several_disjuncts_copies_all_of_them():
     assert structurally_transferable(found.formula(found.best[0]), found.source)
 
 
+def test_copies_that_say_nothing_are_left_out():
+    data = walks("F[0,5] (x >= 3 & y >= 3)", positives=20)
+    weights = np.full(len(data), 1 / len(data))
+    found = hypotheses("F[0,6] (x >= 3 & y >= 2)", copies=3)
+    found.update(data, weights, 4)
+    before = found.errors.min()
+    found.shrink(data, weights, 4)
+    assert found.copies == 1
+    assert found.errors.min() <= before + 1e-9
+    assert found.errors.tolist() == pytest.approx(plain_errors(found, data, weights))
+    assert len(found.formula(found.best[0]).disjuncts) == 1
+
+
+def test_copies_that_are_needed_stay():
+    data = walks("F[0,6] (x >= 3 & y >= 3) | F[0,6] (x <= 1 & y <= 1)")
+    weights = np.full(len(data), 1 / len(data))
+    found = hypotheses("F[0,6] (x >= 3 & y >= 3)", copies=2, count=200)
+    found.positions[0] = found.space.encode(sdnf("F[0,6] (x >= 3 & y >= 3) | F[0,6] (x <= 1 & y <= 1)"))
+    found.update(data, weights, 2)
+    assert found.errors.min() == 0.0
+    positions = found.positions.copy()
+    found.shrink(data, weights, 2)
+    assert found.copies == 2
+    np.testing.assert_array_equal(found.positions, positions)
+
+
 @pytest.mark.parametrize("label", [1, -1])
 def test_growing_needs_both_labels(label: int):
     data = walks(ERRAND, 20)

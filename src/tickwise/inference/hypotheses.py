@@ -136,6 +136,26 @@ class Hypotheses:
         self.positions = parts[picked].reshape(4 * self.count, -1)
         self._select(self.positions, data, weights)
 
+    def shrink(self, data: LabelledTrajectories, weights: NDArray[np.float64], rounds: int = 1) -> None:
+        """Go on with fewer copies of the structure, as long as that does as well: a copy too many says nothing true.
+
+        Args:
+            data: All trajectories so far.
+            weights: What an error in each costs, shape ``(n,)``.
+            rounds: How often to vary and select what is left, before it is compared.
+        """
+        while self.copies > 1:
+            before = self.copies, self.positions, self.errors
+            blocks = self.positions.reshape(len(self.positions), self.copies, -1)
+            left = [np.delete(blocks, copy, axis=1).reshape(len(blocks), -1) for copy in range(self.copies)]
+            self.copies -= 1
+            self.positions = np.concatenate(left)
+            self._select(self.positions, data, weights)
+            self.update(data, weights, rounds)
+            if self.errors.min() > before[2].min() + _TIE:
+                self.copies, self.positions, self.errors = before
+                return
+
     def mass(self, trajectories: LabelledTrajectories, among: NDArray[np.float64]) -> float:
         """The mean share of some formulas that trajectories satisfy: the probability that they are good.
 

@@ -269,6 +269,7 @@ class ClosedLoop:
                 self._grow(int(good.sum()))
         if self._satisfying:
             self._failed = 0
+            self.hypotheses.shrink(data, weights, self.settings.rounds)
             self._act_on(self._most_sure())
 
     @property
@@ -329,8 +330,7 @@ class ClosedLoop:
 
     def _most_promising(self) -> SDNF | None:
         """A hypothesis that agrees as well and could be satisfied clearly more often; None if there is none."""
-        formula = self.formula
-        assert formula is not None
+        formula = self.attempts[-1].formula
         others = self._some(self.hypotheses.best, 4 * self.settings.candidates)
         promises = {each: self._promise(each) for each in dict.fromkeys([formula, *others])}
         found = max(promises, key=promises.__getitem__)
@@ -361,8 +361,7 @@ class ClosedLoop:
 
     def _act(self, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """One episode of learning on the formula, which it has to judge rightly."""
-        attempt = self._acting
-        assert attempt is not None
+        attempt = self.attempts[-1]
         played = self._learner.learn(rng, 1)
         good = bool(self.episodes.add(*played)[0])
         path = self.episodes.trajectories(played[1], np.ones(1, np.int8))
