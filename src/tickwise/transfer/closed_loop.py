@@ -35,6 +35,7 @@ from tickwise.transfer.qtransfer import transfer_q
 
 _FAILURES = 3  # selections without a satisfying formula, one after the other, before another copy is tried
 _MARGIN = 0.02  # by how much another formula has to promise more, as a probability, to be tried
+_MORE = 1.25  # how many times as many good episodes it takes to look for a structure again
 _TRIES = 6  # formulas that are tried because they promise more
 _NODES = 10_000  # of an exact search; a limit of time would make results depend on the machine
 _TIE = 1e-9  # 1 - 0.9 is a little less than 0.1
@@ -155,6 +156,7 @@ class ClosedLoop:
         self._guess: Learner | None = None
         self._judged: deque[bool] = deque(maxlen=settings.fresh)
         self._explored = self._failed = self._tried = 0
+        self._enough: float = settings.patience  # good episodes before the structure is given up
 
     @property
     def assumed(self) -> SDNF:
@@ -204,8 +206,6 @@ class ClosedLoop:
             returns[episode], paths[episode] = played[0][0], played[1][0]
         return returns, paths
 
-    # collecting
-
     def _explore(self, rng: np.random.Generator) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """One episode that puts as many hypotheses as can be to the test; after a batch of them, a selection."""
         if rng.random() < self.settings.random:
@@ -254,12 +254,10 @@ class ClosedLoop:
         model.recount(self.episodes.paths)
         return model
 
-    # inferring
-
     def _infer(self) -> None:
         """Act on a formula that is satisfying on all episodes, if there is one (Problem 1, Step 2)."""
         good = self.episodes.good
-        if good.sum() < self.settings.positives or good.all():
+        if not self.settings.positives <= good.sum() < len(good):
             return
         data, weights = self.episodes.labelled()
         self.hypotheses.update(data, weights, self.settings.rounds)
@@ -285,7 +283,8 @@ class ClosedLoop:
             hypotheses.update(data, weights, 3 * self.settings.rounds)
             if not self._satisfying:
                 hypotheses.copies, hypotheses.positions, hypotheses.errors = before
-        if not self._satisfying and good >= self.settings.patience:
+        if not self._satisfying and good >= self._enough:
+            self._enough = _MORE * good
             self._refuted = self._refuted or self._refutation()
             self._start_over()
 
@@ -341,8 +340,6 @@ class ClosedLoop:
         plan, starts = self._model(formula), self.episodes.starts
         values = satisfying_plan(plan)[plan.problem.memory.start[starts], starts]
         return float(values.max(axis=1).mean())
-
-    # acting
 
     def _act_on(self, formula: SDNF) -> None:
         """Go on with a formula, with what was learned on the one before."""
