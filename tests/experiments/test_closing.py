@@ -33,7 +33,7 @@ from tickwise.transfer.hypothesis import tick_tables
 
 
 def closed(spec: StudySpec, **more: Any) -> StudySpec:
-    learning = replace(spec.learning, most_episodes={"V": 300}, loop=LoopSettings(hypotheses=400), **more)
+    learning = replace(spec.learning, most_episodes={"V": 600}, loop=LoopSettings(hypotheses=400), **more)
     return replace(spec, learning=learning, collections=1, full=0)
 
 
@@ -48,11 +48,11 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Store:
 def test_the_loop_is_there_within_its_episodes(store: Store):
     for run in range(SPEC.runs):
         found = store.load(f"learn-V-{run}")
-        assert found["episodes"] == 300
-        assert found["evaluation_episodes"].tolist() == list(range(0, 301, 20))
-        assert len(found["blocks"]) == 30
-        assert 0 < found["first_good"] < found["collected"] <= 300
-        assert sum(attempt["episodes"] for attempt in found["attempts"]) <= 300 - found["first_good"]
+        assert found["episodes"] == 600
+        assert found["evaluation_episodes"].tolist() == list(range(0, 601, 20))
+        assert len(found["blocks"]) == 60
+        assert 0 < found["first_good"] < found["collected"] <= 600
+        assert sum(attempt["episodes"] for attempt in found["attempts"]) <= 600 - found["first_good"]
         source = store.load("infer-0")["source"]["formula"]
         # a tiny collection gives a structure that the target may not have; the loop goes on without it, and says so
         assert found["transferable"] != found["reason"].startswith("Logical transferability is not identified")
@@ -63,7 +63,7 @@ def test_the_loop_is_there_within_its_episodes(store: Store):
 def test_each_recording_has_the_formula_that_the_loop_had_then(store: Store):
     for number in range(SPEC.runs):
         found = store.load(f"learn-V-{number}")
-        assert found[PREFIX + "at"].tolist() == [0, 20, 40, 300]
+        assert found[PREFIX + "at"].tolist() == [0, 20, 60, 600]
         formulas = found[PREFIX + "formulas"]
         assert formulas[-1] == found["formula"]
         assert len(set(formulas)) > 1
