@@ -208,6 +208,16 @@ def test_a_killed_worker_is_explained(tmp_path: Path):
     assert active_children() == []
 
 
+def test_a_worker_killed_while_another_one_starts_is_explained_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def closed(*_: Any) -> None:
+        raise OSError("handle is closed")
+
+    monkeypatch.setattr(executors.ProcessPoolExecutor, "submit", closed)
+    with pytest.raises(TickwiseError, match=r"a worker process was killed, .*--workers"):
+        run(LONG, tmp_path / "run", 2)
+    assert active_children() == []
+
+
 def test_it_runs_in_any_thread(finished: Path):
     failures: list[BaseException] = []
 

@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -131,16 +131,22 @@ def _run_here(tasks: Sequence[Task], shared: Board) -> Iterator[int]:
 
 def _run_in(pool: ProcessPoolExecutor, tasks: Sequence[Task], shared: Board) -> Iterator[int]:
     try:
-        # the workers that start now go on ignoring Ctrl-C, and show no traceback
-        with _on_signal(signal.SIG_IGN, signal.SIGINT):
-            futures = [pool.submit(_work, task, shared) for task in tasks]
-        for future in as_completed(futures):
+        for future in as_completed(_submitted(pool, tasks, shared)):
             yield future.result()
     except BrokenProcessPool as error:
         raise TickwiseError(
             "a worker process was killed, perhaps for want of memory; run the same command again with fewer "
             "--workers: what is finished is kept"
         ) from error
+
+
+def _submitted(pool: ProcessPoolExecutor, tasks: Sequence[Task], shared: Board) -> list[Future[int]]:
+    try:
+        # the workers that start now go on ignoring Ctrl-C, and show no traceback
+        with _on_signal(signal.SIG_IGN, signal.SIGINT):
+            return [pool.submit(_work, task, shared) for task in tasks]
+    except OSError as error:  # one was killed while another one started
+        raise BrokenProcessPool(str(error)) from error
 
 
 def _work(task: Task, shared: Board) -> int:
