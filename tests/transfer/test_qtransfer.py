@@ -43,6 +43,22 @@ def recognisable(memory: Memory, mdp: TabularMDP) -> np.ndarray:
     return np.arange(np.prod(shape), dtype=np.float32).reshape(shape)
 
 
+def place_ranks(
+    source_mdp: TabularMDP, origin: TickTable, target_mdp: TabularMDP, table: TickTable, j: int, s: int
+) -> list[tuple[float, bool, int]]:
+    """The source's cells in the order of how alike they are: squared distance, whether truth differs, number."""
+    rho, own = (each.automaton.conjunction.primitives[j] for each in (origin, table))
+    here = target_mdp.coordinates[s]
+    relative = here - own.box.centroid(target_mdp.variables, target_mdp.limits)
+    centroid = rho.box.centroid(source_mdp.variables, source_mdp.limits)
+    ranks = []
+    for cell, there in enumerate(source_mdp.cell_coordinates):
+        distance = round(float(np.sum((there - centroid - relative) ** 2)), 9)
+        differs = contains(rho, source_mdp.variables, there) != contains(own, target_mdp.variables, here)
+        ranks.append((distance, differs, cell))
+    return sorted(ranks)
+
+
 def algorithm_2(
     source_mdp: TabularMDP, source_memory: Memory, q: np.ndarray, target_mdp: TabularMDP, target_memory: Memory
 ) -> Iterator[tuple[int, int, np.ndarray]]:
@@ -56,16 +72,7 @@ def algorithm_2(
 
         @cache
         def similar_state(j: int, s: int, tables: tuple[TickTable, TickTable] = (source, target)) -> int:  # line 6
-            rho, own = (table.automaton.conjunction.primitives[j] for table in tables)
-            here = target_mdp.coordinates[s]
-            relative = here - own.box.centroid(target_mdp.variables, target_mdp.limits)
-            centroid = rho.box.centroid(source_mdp.variables, source_mdp.limits)
-            ranks = []
-            for cell, there in enumerate(source_mdp.cell_coordinates):
-                distance = round(float(np.sum((there - centroid - relative) ** 2)), 9)
-                disagrees = contains(rho, source_mdp.variables, there) != contains(own, target_mdp.variables, here)
-                ranks.append((distance, disagrees, cell))
-            return min(ranks)[2] * 4 + s % 4
+            return place_ranks(source_mdp, tables[0], target_mdp, tables[1], j, s)[0][2] * 4 + s % 4
 
         for u in range(1, len(target)):
             j = int(target.stage[u])  # line 3, and by position line 5

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tests.rl.twins import random_problem
 from tests.strategies import predicates, sdnfs, transferable_pairs
-from tests.transfer.test_qtransfer import contains, recognisable, tables
+from tests.transfer.test_qtransfer import place_ranks, recognisable, tables
 from tickwise.automata.ticks import TickTable
 from tickwise.envs.gridworld import GridWorld
 from tickwise.envs.tabulate import TabularMDP
@@ -172,22 +172,6 @@ def slow_transfer(
                             distance, v, cell = other
                     where = (first + v, cell * 4 + s % 4, action)
                     yield (target.memory.offsets[i] + u, s, action), q[where], distance, int(visits[where])
-
-
-def place_ranks(
-    source_mdp: TabularMDP, origin: TickTable, target_mdp: TabularMDP, table: TickTable, j: int, s: int
-) -> list[tuple[float, bool, int]]:
-    """The source's cells in the order of how alike they are: squared distance, whether truth differs, number."""
-    rho, own = (each.automaton.conjunction.primitives[j] for each in (origin, table))
-    here = target_mdp.coordinates[s]
-    relative = here - own.box.centroid(target_mdp.variables, target_mdp.limits)
-    centroid = rho.box.centroid(source_mdp.variables, source_mdp.limits)
-    ranks = []
-    for cell, there in enumerate(source_mdp.cell_coordinates):
-        distance = round(float(np.sum((there - centroid - relative) ** 2)), 9)
-        differs = contains(rho, source_mdp.variables, there) != contains(own, target_mdp.variables, here)
-        ranks.append((distance, differs, cell))
-    return sorted(ranks)
 
 
 def slow_progress(table: TickTable, origin: TickTable, u: int) -> list[float]:

@@ -41,7 +41,7 @@ def closed_loop(spec: StudySpec, store: Artefacts, run: int) -> ClosedLoop:
     """The closed loop of a run, before its first episode.
 
     Raises:
-        ConfigurationError: If no formula of the source task was inferred.
+        ConfigurationError: If no satisfying formula of the source task was inferred.
     """
     source = satisfying_source(spec, store)
     if source is None:

@@ -343,14 +343,14 @@ class ClosedLoop:
 
     def _act_on(self, formula: SDNF) -> None:
         """Go on with a formula, with what was learned on the one before."""
-        problem, form, before = self.target.extended(formula), self.settings.form, self._learner
+        form, before = self.settings.form, self._learner
         if isinstance(form, ModelBased):
             self._learner = self._rewarded(formula)
         elif not (self.attempts and structurally_transferable(formula, self.attempts[-1].formula)):
-            self._learner = form.learner(problem)  # nothing was learned that ξ could take along
+            self._learner = form.learner(self.target.extended(formula))  # nothing was learned that ξ could take along
         else:
-            mdp, fallback = problem.mdp, float(np.median(before.q))
-            q = transfer_q(mdp, before.problem.memory, before.q, mdp, problem.memory, fallback)
+            problem, fallback = self.target.extended(formula), float(np.median(before.q))
+            q = transfer_q(problem.mdp, before.problem.memory, before.q, problem.mdp, problem.memory, fallback)
             self._learner = form.learner(problem, q)
         self._acting, self._guess = Attempt(formula, len(self.episodes)), None
         self.attempts.append(self._acting)
