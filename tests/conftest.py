@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,10 @@ from tests import browsers
 # the first call of a compiled kernel takes seconds; on a server the same cases are tried each time
 settings.register_profile("tickwise", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("tickwise")
+
+# what a script starts in the background ignores Ctrl-C, and so would every process that the tests start
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

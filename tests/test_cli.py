@@ -80,10 +80,8 @@ def tickwise(capsys: pytest.CaptureFixture[str]) -> Tickwise:
 
 def process(*arguments: object, module: str = "tickwise", **options: Any) -> subprocess.Popen[str]:
     """The command line, or that of the tiny studies, in a process group of its own."""
-    # what starts the tests in the background has them ignore Ctrl-C, and their children inherit it
-    listening = ["env", "--default-signal=INT"] if sys.platform.startswith("linux") else []
     return subprocess.Popen(
-        [*listening, sys.executable, "-m", module, *map(str, arguments)],
+        [sys.executable, "-m", module, *map(str, arguments)],
         cwd=ROOT, text=True, encoding="utf-8", start_new_session=True,
         **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "env": {**os.environ, **PLAIN}, **options},
     )  # fmt: skip
