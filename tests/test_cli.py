@@ -59,7 +59,11 @@ class Tickwise:
 
     def __call__(self, *arguments: object) -> Answer:
         self.capture.readouterr()
-        status = main([str(argument) for argument in arguments])
+        before = signal.getsignal(signal.SIGINT)
+        try:
+            status = main([str(argument) for argument in arguments])
+        finally:  # an interrupted command ignores further ones until its process ends
+            signal.signal(signal.SIGINT, before)
         return Answer(status, *self.capture.readouterr())
 
     def fails(self, *arguments: object, status: int = 1) -> str:
@@ -614,12 +618,8 @@ def test_an_interrupt_is_one_line(tickwise: Tickwise, monkeypatch: pytest.Monkey
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    before = signal.getsignal(signal.SIGINT)
     monkeypatch.setattr("tickwise.inference.reading.read_trajectories", interrupted)
-    try:
-        assert tickwise("infer", "logs.csv") == Answer(130, "", "interrupted\n")
-    finally:
-        signal.signal(signal.SIGINT, before)
+    assert tickwise("infer", "logs.csv") == Answer(130, "", "interrupted\n")
 
 
 # ---------------------------------------------------------------- as a process
