@@ -35,7 +35,7 @@ from tickwise.transfer.qtransfer import transfer_q
 
 _FAILURES = 3  # selections without a satisfying formula, one after the other, before another copy is tried
 _MARGIN = 0.02  # by how much another formula has to promise more, as a probability, to be tried
-_MORE = 1.25  # how many times as many good episodes it takes to look for a structure again
+_MORE = 1.25  # how many times as many episodes it takes to look for a structure again
 _TRIES = 6  # formulas that are tried because they promise more
 _NODES = 10_000  # of an exact search; a limit of time would make results depend on the machine
 _TIE = 1e-9  # 1 - 0.9 is a little less than 0.1
@@ -156,7 +156,7 @@ class ClosedLoop:
         self._guess: Learner | None = None
         self._judged: deque[bool] = deque(maxlen=settings.fresh)
         self._explored = self._failed = self._tried = 0
-        self._enough: float = settings.patience  # good episodes before the structure is given up
+        self._again = 0.0  # episodes before another structure is looked for
 
     @property
     def assumed(self) -> SDNF:
@@ -283,8 +283,8 @@ class ClosedLoop:
             hypotheses.update(data, weights, 3 * self.settings.rounds)
             if not self._satisfying:
                 hypotheses.copies, hypotheses.positions, hypotheses.errors = before
-        if not self._satisfying and good >= self._enough:
-            self._enough = _MORE * good
+        if not self._satisfying and good >= self.settings.patience and len(self.episodes) >= self._again:
+            self._again = _MORE * len(self.episodes)
             self._refuted = self._refuted or self._refutation()
             self._start_over()
 
