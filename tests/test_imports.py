@@ -17,7 +17,7 @@ ROOT = Path(tickwise.__file__).parent
 
 # A module may import its own layer and those of lower rank. Layers of equal rank do not know each other.
 RANKS = {
-    "errors": 0, "_jit": 0, "_seeding": 0, "_wording": 0, "_files": 0.5, "_archives": 0.5,
+    "errors": 0, "_arrays": 0, "_jit": 0, "_seeding": 0, "_wording": 0, "_files": 0.5, "_archives": 0.5,
     "logic": 1,
     "automata": 2,
     "envs": 3,

@@ -55,6 +55,8 @@ def test_parts_make_the_whole(data, cuts):
     whole = code(states, weights, LEVELS, 70)
     mask = np.arange(len(states)) % 2 == 0
     assert same(whole.select(mask), code(states.select(mask), weights[mask], LEVELS, 70))
+    # another layout would be compiled for once more
+    assert all(array.flags.c_contiguous for array in whole.select(mask))
 
 
 def numbers(rows, names=("x",)):

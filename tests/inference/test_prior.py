@@ -1,3 +1,5 @@
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -69,3 +71,14 @@ def test_letters_of_independent_draws_have_exact_measures():
 def test_wrong_priors(build, error, message):
     with pytest.raises(error, match=message):
         build()
+
+
+def test_kernels_are_compiled_once_for_all_priors():
+    # a copy stands for what another process is sent, where nothing is frozen
+    path = PathPrior(np.ones((3, 3)), np.arange(6.0).reshape(3, 2), horizon=4)
+    chain = MarkovPrior(np.full(3, 1 / 3), np.full((3, 3), 1 / 3), np.arange(6.0).reshape(3, 2), horizon=4)
+    box = BoxPrior({"x": (0.0, 1.0), "y": (0.0, 1.0)}, 4)
+    for prior in (path, deepcopy(path), chain, box, deepcopy(box)):
+        for array in prior.arrays(("y", "x"))[3:]:
+            assert array.flags.c_contiguous
+            assert not array.flags.writeable

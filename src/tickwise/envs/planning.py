@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._arrays import read_only
 from tickwise._jit import njit
 from tickwise.envs.tabulate import TabularMDP
 from tickwise.envs.tasks import TaskTable
@@ -72,8 +73,8 @@ def _value(
     mdp: TabularMDP, task: TaskTable, reward: NDArray[np.float32], final_reward: NDArray[np.float32], sign: float
 ) -> float:
     values = backward_induction(
-        mdp.successor, mdp.probability, task.delta, task.letter, reward, final_reward, task.terminated,
-        task.horizon, sign,
+        mdp.successor, mdp.probability, task.delta, task.letter, read_only(reward), read_only(final_reward),
+        task.terminated, task.horizon, sign,
     )  # fmt: skip
     first = task.delta[0, task.letter]
     return float(mdp.initial @ values[first, range(mdp.n_states)])

@@ -3,21 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._arrays import frozen_array
 from tickwise.errors import DataError
 
 _TOLERANCE = 1e-9
-
-
-def frozen_array(values: Any, dtype: type[np.generic]) -> NDArray[Any]:
-    """A contiguous copy of an array that cannot be written to, so that a frozen value stays what it is."""
-    array = np.array(values, dtype=dtype, order="C")
-    array.flags.writeable = False
-    return array
 
 
 def cumulative(probability: NDArray[np.float64]) -> NDArray[np.float64]:

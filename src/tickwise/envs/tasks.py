@@ -13,7 +13,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.envs.tabulate import TabularMDP, frozen_array
+from tickwise._arrays import frozen_array
+from tickwise.envs.tabulate import TabularMDP
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.logic.syntax import Box
 

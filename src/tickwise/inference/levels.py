@@ -154,7 +154,7 @@ class Coded(NamedTuple):
 
     def select(self, mask: NDArray[np.bool_]) -> Coded:
         """The trajectories where the mask is true."""
-        at_least, at_most = self.at_least[:, :, mask], self.at_most[:, :, mask]
+        at_least, at_most = (bits.compress(mask, axis=2) for bits in (self.at_least, self.at_most))
         return Coded(at_least, at_most, self.alive[mask], self.positive[mask], self.weights[mask])
 
 

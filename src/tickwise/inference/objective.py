@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._arrays import read_only
 from tickwise._jit import njit
 from tickwise.errors import ConfigurationError
 from tickwise.inference.counting import log_probability
@@ -144,7 +145,7 @@ class Objective:
 
 def formula_signature(formula: SDNF, data: LabelledTrajectories) -> NDArray[np.bool_]:
     """Whether each trajectory's weak verdict is not FALSE (g = 1), shape ``(n,)``."""
-    return satisfied(data.values, data.lengths, *to_arrays(formula, data.variables))
+    return satisfied(read_only(data.values), read_only(data.lengths), *to_arrays(formula, data.variables))
 
 
 @njit

@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tickwise._arrays import read_only
 from tickwise.errors import ConfigurationError, DataError, UnknownVariableError
 from tickwise.inference.kernels import PriorArrays
 from tickwise.logic.semantics import holds
@@ -96,10 +97,11 @@ class _Graph:
         _require(variables, self.variables)
         columns = [self.variables.index(name) for name in variables]
         none = np.zeros(0)
-        return PriorArrays(
-            False, len(self.scale), self.most, np.ascontiguousarray(self.coordinates[:, columns]), self.indptr,
-            self.indices, self.weights, self.scale, self.backward, self.forward, none, none,
+        arrays: tuple[NDArray[Any], ...] = (
+            np.ascontiguousarray(self.coordinates[:, columns]), self.indptr, self.indices, self.weights, self.scale,
+            self.backward, self.forward, none, none,
         )  # fmt: skip
+        return PriorArrays(False, len(self.scale), self.most, *map(read_only, arrays))
 
 
 def _require(wanted: Sequence[str], known: Sequence[str]) -> None:
@@ -341,4 +343,5 @@ class BoxPrior:
         _require(variables, self.variables)
         low, high = (np.array([self.bounds[name][side] for name in variables]) for side in (0, 1))
         whole, real, grid = np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros((0, 0))
-        return PriorArrays(True, self.horizon, math.inf, grid, whole, whole, real, real, grid, grid, low, high)
+        arrays: tuple[NDArray[Any], ...] = (grid, whole, whole, real, real, grid, grid, low, high)
+        return PriorArrays(True, self.horizon, math.inf, *map(read_only, arrays))

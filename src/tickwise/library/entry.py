@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._arrays import frozen_array
 from tickwise._wording import brief, listed
 from tickwise.automata.ticks import TickTable
-from tickwise.envs.tabulate import TabularMDP, frozen_array
+from tickwise.envs.tabulate import TabularMDP
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.logic.sdnf import SDNF
 from tickwise.rl.states import Memory, automaton_memory, disjunct_choice

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._arrays import read_only
 from tickwise.errors import UnknownVariableError
 from tickwise.logic.batch import Batch, Trajectories, arranged, as_batch, require_no_nan
 from tickwise.logic.program import Program, program, variables_of
@@ -155,4 +156,4 @@ def _robustness(compiled: Program, batch: Batch) -> tuple[NDArray[np.float64], N
 def _rows(batch: Batch) -> NDArray[np.float64]:
     """The values of each trajectory in a row, shape (n, ticks * variables)."""
     count, ticks, columns = batch.values.shape
-    return np.ascontiguousarray(batch.values).reshape(count, ticks * columns)
+    return read_only(np.ascontiguousarray(batch.values).reshape(count, ticks * columns))

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._arrays import read_only
 from tickwise.envs.tabulate import TabularMDP, cumulative
 from tickwise.envs.tasks import TaskTable
 from tickwise.errors import ConfigurationError
@@ -173,6 +174,6 @@ def evaluate(problem: Problem, q: NDArray[np.float32], seed: np.random.SeedSeque
         The mean return, in units of reward.
     """
     returns = np.empty(episodes, dtype=np.float32)
-    arguments: tuple[Any, ...] = (*problem.arrays, take_stream(np.random.default_rng(seed)), q, returns)
+    arguments: tuple[Any, ...] = (*problem.arrays, take_stream(np.random.default_rng(seed)), read_only(q), returns)
     greedy_returns(*arguments)
     return float(returns.mean(dtype=np.float64))

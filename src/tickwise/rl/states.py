@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from tickwise._arrays import frozen_array
 from tickwise.automata.ticks import TickTable
-from tickwise.envs.tabulate import TabularMDP, frozen_array
+from tickwise.envs.tabulate import TabularMDP
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.logic.semantics import holds
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.envs.tabulate import frozen_array
+from tickwise._arrays import frozen_array
 from tickwise.errors import ConfigurationError
 from tickwise.rl.states import Memory
 
