@@ -35,9 +35,10 @@ from tickwise.rl.forms import find_form
 from tickwise.rl.learner import Learner, LearningForm, QLearning
 from tickwise.rl.qlearning import Problem, evaluate
 from tickwise.rl.states import automaton_memory, tau_memory
-from tickwise.transfer.closed_loop import ClosedLoop, LoopSettings, Target
+from tickwise.transfer.closed_loop import ClosedLoop, Target
 from tickwise.transfer.episodes import good_return, unbroken
 from tickwise.transfer.hypothesis import tick_tables
+from tickwise.transfer.settings import LoopSettings
 
 LOOKS = {
     "q": ("Q-learning", "#0072B2", "-."),

@@ -28,8 +28,8 @@ from tickwise.logic.sdnf import to_sdnf
 from tickwise.logic.structure import structurally_transferable
 from tickwise.rl.learner import QLearning
 from tickwise.rl.qlearning import QSettings
-from tickwise.transfer.closed_loop import LoopSettings
 from tickwise.transfer.hypothesis import tick_tables
+from tickwise.transfer.settings import LoopSettings
 
 
 def closed(spec: StudySpec, **more: Any) -> StudySpec:

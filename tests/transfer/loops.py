@@ -17,8 +17,9 @@ from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, to_sdnf
 from tickwise.rl.qlearning import Problem, evaluate
 from tickwise.rl.states import tick_memory
-from tickwise.transfer.closed_loop import ClosedLoop, LoopSettings, Target
+from tickwise.transfer.closed_loop import ClosedLoop, Target
 from tickwise.transfer.episodes import Good, good_return, unbroken
+from tickwise.transfer.settings import LoopSettings
 
 QUICK: dict[str, Any] = {"hypotheses": 300, "candidates": 3, "fresh": 20}
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.transfer.loops import CASES, EITHER, ERRAND, KEEP, QUICK, STAY, Case, sdnf, share_of_the_optimum
+from tests.transfer.loops import CASES, EITHER, ERRAND, KEEP, STAY, Case, sdnf, share_of_the_optimum
 from tickwise.envs.temporal import FormulaTask
 from tickwise.errors import ConfigurationError, DataError
 from tickwise.inference.fit import Fit
@@ -20,7 +20,7 @@ from tickwise.rl.learner import LearningForm, QLearning
 from tickwise.rl.model import ModelBased, no_counts
 from tickwise.rl.qlearning import QSettings
 from tickwise.transfer import closed_loop
-from tickwise.transfer.closed_loop import ClosedLoop, LoopSettings
+from tickwise.transfer.closed_loop import ClosedLoop
 from tickwise.transfer.qtransfer import transfer_q
 
 ELSEWHERE = "F[0,5] G[0,2] (x <= 1 & y >= 3)"
@@ -314,18 +314,3 @@ def test_random_episodes_alone():
     # tied actions are drawn, so the world is met nearly everywhere
     assert loop.outcomes.sum() == 600
     assert (loop.outcomes.sum(axis=2) > 0).mean() > 0.9
-
-
-@pytest.mark.parametrize(
-    "name", ["batch", "hypotheses", "candidates", "imagined", "rounds", "positives", "fresh", "patience"]
-)
-def test_counts_out_of_range_are_refused(name: str):
-    LoopSettings(**{name: 1})  # type: ignore[arg-type]
-    with pytest.raises(ConfigurationError, match=f"^{name} of the closed loop is 0; use 1 or more$"):
-        LoopSettings(**QUICK | {name: 0})
-
-
-@pytest.mark.parametrize("share", [-0.1, 1.1, float("nan")])
-def test_shares_out_of_range_are_refused(share: float):
-    with pytest.raises(ConfigurationError, match=r"^random of the closed loop is .*; use a share from 0 to 1$"):
-        LoopSettings(random=share)

@@ -12,7 +12,7 @@ from tickwise.inference.swarm import SwarmSettings
 from tickwise.inference.tree import InferenceSettings
 from tickwise.rl.learner import LearningForm, QLearning
 from tickwise.rl.qlearning import QSettings
-from tickwise.transfer.closed_loop import LoopSettings
+from tickwise.transfer.settings import LoopSettings
 from tickwise.transfer.variants import Transfer
 
 METHODS = ("I", "II", "III", "IV", "V")

@@ -9,12 +9,12 @@ ones. If it misjudges them, the next formula follows, and values go from one to 
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tickwise.errors import ConfigurationError, DataError
+from tickwise.errors import DataError
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.growth import infer_jointly
 from tickwise.inference.hypotheses import Hypotheses
@@ -25,13 +25,14 @@ from tickwise.inference.space import SearchSpace
 from tickwise.inference.tree import InferenceSettings
 from tickwise.logic.sdnf import SDNF
 from tickwise.logic.structure import structurally_transferable
-from tickwise.rl.learner import Learner, LearningForm
+from tickwise.rl.learner import Learner
 from tickwise.rl.model import ModelBased, ModelLearner, imagined, no_counts, satisfying_plan
 from tickwise.rl.qlearning import Problem
 from tickwise.rl.states import DisjunctChoice, automaton_memory, nearest_centroid
 from tickwise.transfer.episodes import Episodes, Good
 from tickwise.transfer.hypothesis import tick_tables
 from tickwise.transfer.qtransfer import transfer_q
+from tickwise.transfer.settings import LoopSettings
 
 _FAILURES = 3  # selections without a satisfying formula, one after the other, before another copy is tried
 _MARGIN = 0.02  # by how much another formula has to promise more, as a probability, to be tried
@@ -39,47 +40,6 @@ _MORE = 1.25  # how many times as many episodes it takes to look for a structure
 _TRIES = 6  # formulas that are tried because they promise more
 _NODES = 10_000  # of an exact search; a limit of time would make results depend on the machine
 _TIE = 1e-9  # 1 - 0.9 is a little less than 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class LoopSettings:
-    """How the closed loop goes about it.
-
-    Attributes:
-        form: How it learns while it acts on a formula.
-        batch: Explored episodes between two selections of hypotheses.
-        hypotheses: How many formulas are kept that agree best with the episodes.
-        candidates: How many of them are planned for before an explored episode.
-        imagined: Episodes of each plan that are imagined, to see how many hypotheses accept them.
-        random: The share of explored episodes whose actions are random.
-        rounds: Selections of hypotheses before a formula is acted on.
-        positives: Good episodes before a formula is acted on.
-        fresh: Fresh episodes that a formula has to judge rightly, but for a share of 1 - ζ, for collecting to end; at
-            least `positives` of them good.
-        patience: Good episodes that are enough to go on with other structures where no number of copies of the
-            source's is satisfying. It is taken back if a formula of that structure is found to be right after all.
-
-    Raises:
-        ConfigurationError: If a number is out of range.
-    """
-
-    form: LearningForm = field(default_factory=ModelBased)
-    batch: int = 10
-    hypotheses: int = 4_000
-    candidates: int = 6
-    imagined: int = 4
-    random: float = 0.1
-    rounds: int = 4
-    positives: int = 3
-    fresh: int = 30
-    patience: int = 10
-
-    def __post_init__(self) -> None:
-        for name in ("batch", "hypotheses", "candidates", "imagined", "rounds", "positives", "fresh", "patience"):
-            if getattr(self, name) < 1:
-                raise ConfigurationError(f"{name} of the closed loop is {getattr(self, name)}; use 1 or more")
-        if not 0 <= self.random <= 1:
-            raise ConfigurationError(f"random of the closed loop is {self.random}; use a share from 0 to 1")
 
 
 @dataclass(slots=True)
