@@ -117,6 +117,7 @@ class ClosedLoop:
         self._judged: deque[bool] = deque(maxlen=settings.fresh)
         self._explored = self._failed = self._tried = 0
         self._again = 0.0  # episodes before another structure is looked for
+        self._aside: Hypotheses | None = None  # what is gone back to where another structure turns out to be wrong
 
     @property
     def assumed(self) -> SDNF:
@@ -185,15 +186,17 @@ class ClosedLoop:
         """The plan to satisfy a hypothesis, and its table, whose imagined episodes most of the hypotheses accept."""
         best = self.hypotheses.best
         found = []
-        for formula in self._some(best, self.settings.candidates):
+        for formula in self._some(self.hypotheses, self.settings.candidates):
             plan = self._model(formula)
             table = satisfying_plan(plan)
             found.append((self._mass(plan, best, self.settings.imagined, table), plan, table))
         return max(found, key=lambda each: each[0])[1:]
 
-    def _some(self, best: NDArray[np.float64], most: int) -> list[SDNF]:
+    def _some(self, hypotheses: Hypotheses, most: int) -> list[SDNF]:
+        """Some of those that agree best."""
+        best = hypotheses.best
         rows = self.rng.choice(len(best), min(most, len(best)), replace=False)
-        return [self.hypotheses.formula(best[row]) for row in rows]
+        return [hypotheses.formula(best[row]) for row in rows]
 
     def _mass(
         self, plan: ModelLearner, among: NDArray[np.float64], episodes: int, table: NDArray[np.float32] | None = None
@@ -221,6 +224,9 @@ class ClosedLoop:
             return
         data, weights = self.episodes.labelled()
         self.hypotheses.update(data, weights, self.settings.rounds)
+        if not self._satisfying and self._aside is not None:
+            self.hypotheses, self._aside = self._aside, None
+            self.hypotheses.update(data, weights, self.settings.rounds)
         if not self._satisfying:
             self._failed += 1
             if self._failed % _FAILURES == 0:
@@ -232,7 +238,10 @@ class ClosedLoop:
 
     @property
     def _satisfying(self) -> bool:
-        return bool(self.hypotheses.errors.min() <= 1 - self.target.settings.rate + _TIE)
+        return self._is_satisfying(self.hypotheses)
+
+    def _is_satisfying(self, hypotheses: Hypotheses) -> bool:
+        return bool(hypotheses.errors.min() <= 1 - self.target.settings.rate + _TIE)
 
     def _grow(self, good: int) -> None:
         """One more copy of the structure, or the end of the supposition that it is the source's."""
@@ -283,14 +292,32 @@ class ClosedLoop:
         best = self.hypotheses.best
         masses = {
             formula: self._mass(self._rewarded(formula), best, 4 * self.settings.imagined)
-            for formula in self._some(best, 4 * self.settings.candidates)
+            for formula in self._some(self.hypotheses, 4 * self.settings.candidates)
         }
         return max(masses, key=masses.__getitem__)
 
-    def _most_promising(self) -> SDNF | None:
-        """A hypothesis that agrees as well and could be satisfied clearly more often; None if there is none."""
+    def _more_promising(self) -> SDNF | None:
+        """A formula that agrees as well and could be satisfied clearly more often; None if none is found.
+
+        Where the structure is a guess, too, it may be of one like it: what a formula forbids for nothing is never done,
+        so that no episode tells.
+        """
+        if not self._satisfying:
+            return None
+        other = self._most_promising(self.hypotheses)
+        if other is not None or self.transferable:
+            return other
+        for hypotheses in map(self._around, neighbours(self.attempts[-1].formula)):
+            other = self._most_promising(hypotheses) if self._is_satisfying(hypotheses) else None
+            if other is not None:
+                self.hypotheses, self._aside = hypotheses, self.hypotheses
+                return other
+        return None
+
+    def _most_promising(self, hypotheses: Hypotheses) -> SDNF | None:
+        """That of some hypotheses."""
         formula = self.attempts[-1].formula
-        others = self._some(self.hypotheses.best, 4 * self.settings.candidates)
+        others = self._some(hypotheses, 4 * self.settings.candidates)
         promises = {each: self._promise(each) for each in dict.fromkeys([formula, *others])}
         found = max(promises, key=promises.__getitem__)
         return found if promises[found] > promises[formula] + _MARGIN else None
@@ -347,7 +374,7 @@ class ClosedLoop:
         if self._tried < _TRIES:
             self._tried += 1
             self.hypotheses.update(*self.episodes.labelled(), self.settings.rounds)
-            other = self._most_promising() if self._satisfying else None
+            other = self._more_promising()
             if other is not None:
                 self._act_on(other)
                 return
