@@ -137,6 +137,45 @@ def test_the_verdict_is_taken_back_where_a_formula_of_the_structure_is_found():
     assert (loop.transferable, loop.reason) == (True, "")
 
 
+@pytest.mark.parametrize("guessed", [False, True])
+def test_a_guessed_structure_that_forbids_too_much_is_recovered_from(guessed: bool):
+    # to be on the right at tick 7 or 8 would do, and nothing that is done meanwhile tells
+    strong = sdnf("F[0,4] (x <= 1) & G[7,8] (x >= 2)")
+    loop, rng = ERRAND.loop(3, patience=100), np.random.default_rng(3)
+    loop.learn(rng, 100)
+    loop._refuted = "No." if guessed else ""
+    loop.source = strong
+    loop.hypotheses = loop._around(strong)
+    loop._act_on(strong)
+    if guessed:
+        loop.source = sdnf(ERRAND.source)
+    assert share_of_the_optimum(loop) < 0.9
+    loop.learn(rng, 200)
+    check_books(loop)
+    assert loop.formula is not None
+    assert loop.collected is not None
+    assert structurally_transferable(loop.formula, strong) != guessed
+    assert (share_of_the_optimum(loop) > 0.95) == guessed
+
+
+def test_another_structure_that_turns_out_to_be_wrong_is_gone_back_from():
+    loop, rng = STAY.loop(), np.random.default_rng(0)
+    loop.learn(rng, 100)
+    assert loop._satisfying
+    right = loop.hypotheses
+    wrong = sdnf("G[0,9] (x >= 3)")
+    loop.hypotheses, loop._aside = loop._around(wrong), right
+    assert not loop._satisfying
+    loop._act_on(wrong)
+    loop.learn(rng, 10)
+    assert loop.attempts[-2].formula == wrong
+    assert loop.hypotheses is right
+    assert loop._aside is None
+    assert loop._satisfying
+    assert loop.formula is not None
+    assert structurally_transferable(loop.formula, loop.source)
+
+
 def test_what_nothing_was_found_for_is_tried_again(monkeypatch: pytest.MonkeyPatch):
     loop = ERRAND.loop(patience=15)
     tried: list[int] = []
