@@ -30,7 +30,7 @@ def results(spec: StudySpec, formula: str | None = EVERY_OPERATOR, seed: int = 0
             run |= recording(spec.target.world, spec.target.task.deadline, rng, disjunct=-1 if method == "I" else 1)
     for run in found["methods"]["V"]:
         run |= recording(spec.target.world, spec.target.task.deadline, rng, disjunct=0)
-        run[PREFIX + "formulas"] = list(GUESSES)
+        run |= {PREFIX + "formulas": list(GUESSES), "collected": 300}
     for run in found["source_learning"]:
         run |= recording(spec.source.world, spec.source.task.deadline, rng, disjunct=0)
     return found

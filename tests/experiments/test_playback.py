@@ -45,6 +45,7 @@ def test_each_point_of_method_v_has_its_own_formula(played: dict[str, Any]):
     assert (loop["title"], loop["formula"], loop["follows"]) == ("V: closed", None, True)
     for run in loop["runs"]:
         assert [point["formula"] for point in run["points"]] == list(recorded.GUESSES)
+        assert [point["tested"] for point in run["points"]] == [False, True]
     assert not any(
         "formula" in point for method in (tau, extended) for run in method["runs"] for point in run["points"]
     )

@@ -103,6 +103,7 @@ def _points(run: Mapping[str, Any], table: TaskTable) -> list[dict[str, Any]]:
         }
         if _OWN in run:
             point["formula"] = run[_OWN][index]
+            point["tested"] = run["collected"] is not None and int(learned) >= run["collected"]
         points.append(point)
     return points
 

@@ -176,8 +176,9 @@ class Player {
 
   /** The formula in words, and whose it is where it changes on the way. */
   meaning() {
-    const guess = this.point.formula ? `, this run’s best guess after ${numberText(this.point.learned)} episodes` : "";
-    return `${this.formula.symbol}${guess}: ${this.formula.english}.`;
+    const { formula, learned, tested } = this.point;
+    const whose = `, this run’s ${tested ? "formula" : "best guess"} after ${numberText(learned)} episodes`;
+    return `${this.formula.symbol}${formula ? whose : ""}: ${this.formula.english}.`;
   }
 
   outcome() {
