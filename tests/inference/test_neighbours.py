@@ -2,9 +2,10 @@ from __future__ import annotations
 
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 
-from tests.strategies import sdnfs
-from tickwise.inference.neighbours import neighbours
+from tests.strategies import VARIABLES, random_trajectories, sdnfs
+from tickwise.inference.neighbours import neighbours, weaker_neighbours
 from tickwise.logic.parse import parse
 from tickwise.logic.sdnf import SDNF, Operator, Primitive, to_sdnf
 
@@ -46,3 +47,27 @@ def room(primitive: Primitive) -> int:
 )
 def test_by_hand(text: str, other: str):
     assert to_sdnf(parse(other)) in list(neighbours(to_sdnf(parse(text))))
+
+
+@given(sdnfs(), st.integers(0, 2**32 - 1))
+def test_what_asks_for_less_holds_wherever_the_formula_does(formula: SDNF, seed: int):
+    everything = list(neighbours(formula))
+    values = random_trajectories(seed, 20, 1 + max(each.end for each in primitives(formula)), len(VARIABLES))
+    holds = formula.formula.verdict(values, variables=VARIABLES) > 0
+    for other in weaker_neighbours(formula):
+        assert other in everything
+        assert (other.formula.verdict(values, variables=VARIABLES)[holds] > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("text", "others"),
+    [
+        ("F[2,9] (x <= 2)", []),
+        ("F[2,6] G[0,3] (x <= 2)", ["F[2,9] (x <= 2)"]),
+        ("G[2,6] F[0,3] !(x <= 2)", ["F[2,9] !(x <= 2)"]),
+        ("G[2,9] (x <= 2)", ["F[2,6] G[0,3] (x <= 2)", "G[2,6] F[0,3] (x <= 2)", "F[2,9] (x <= 2)"]),
+        ("F[0,1] (x <= 2) & G[2,3] (x <= 1)", ["F[0,1] (x <= 2) & F[2,3] (x <= 1)"]),
+    ],
+)
+def test_what_asks_for_less_by_hand(text: str, others: list[str]):
+    assert list(weaker_neighbours(to_sdnf(parse(text)))) == [to_sdnf(parse(other)) for other in others]

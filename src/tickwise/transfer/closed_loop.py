@@ -18,7 +18,7 @@ from tickwise.errors import DataError
 from tickwise.inference.exact import ExactSettings
 from tickwise.inference.growth import infer_jointly
 from tickwise.inference.hypotheses import Hypotheses
-from tickwise.inference.neighbours import neighbours
+from tickwise.inference.neighbours import neighbours, weaker_neighbours
 from tickwise.inference.objective import formula_signature
 from tickwise.inference.prior import Prior
 from tickwise.inference.space import SearchSpace
@@ -299,15 +299,15 @@ class ClosedLoop:
     def _more_promising(self) -> SDNF | None:
         """A formula that agrees as well and could be satisfied clearly more often; None if none is found.
 
-        Where the structure is a guess, too, it may be of one like it: what a formula forbids for nothing is never done,
-        so that no episode tells.
+        Where the structure is a guess, too, it may be one that asks for less: what a formula forbids for nothing is
+        never done, so that no episode tells.
         """
         if not self._satisfying:
             return None
         other = self._most_promising(self.hypotheses)
         if other is not None or self.transferable:
             return other
-        for hypotheses in map(self._around, neighbours(self.attempts[-1].formula)):
+        for hypotheses in map(self._around, weaker_neighbours(self.attempts[-1].formula)):
             other = self._most_promising(hypotheses) if self._is_satisfying(hypotheses) else None
             if other is not None:
                 self.hypotheses, self._aside = hypotheses, self.hypotheses
