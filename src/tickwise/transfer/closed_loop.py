@@ -8,6 +8,7 @@ ones. If it misjudges them, the next formula follows, and values go from one to 
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, replace
 
@@ -36,7 +37,7 @@ from tickwise.transfer.settings import LoopSettings
 
 _FAILURES = 3  # selections without a satisfying formula, one after the other, before another copy is tried
 _MARGIN = 0.02  # by how much another formula has to promise more, as a probability, to be tried
-_MORE = 1.25  # how many times as many episodes it takes to look for a structure again
+_MORE = 1.25  # how many times as many episodes, or good ones, it takes to look for a structure again
 _TRIES = 6  # formulas that are tried because they promise more
 _NODES = 10_000  # of an exact search; a limit of time would make results depend on the machine
 _TIE = 1e-9  # 1 - 0.9 is a little less than 0.1
@@ -116,7 +117,7 @@ class ClosedLoop:
         self._guess: Learner | None = None
         self._judged: deque[bool] = deque(maxlen=settings.fresh)
         self._explored = self._failed = self._tried = 0
-        self._again = 0.0  # episodes before another structure is looked for
+        self._again = float(settings.patience), math.inf  # good ones or episodes before a structure is looked for
         self._aside: Hypotheses | None = None  # what is gone back to where another structure turns out to be wrong
 
     @property
@@ -252,8 +253,8 @@ class ClosedLoop:
             hypotheses.update(data, weights, 3 * self.settings.rounds)
             if not self._satisfying:
                 hypotheses.copies, hypotheses.positions, hypotheses.errors = before
-        if not self._satisfying and good >= self.settings.patience and len(self.episodes) >= self._again:
-            self._again = _MORE * len(self.episodes)
+        if not self._satisfying and (good >= self._again[0] or len(self.episodes) >= self._again[1]):
+            self._again = _MORE * good, _MORE * len(self.episodes)  # either kind may be rare
             self._refuted = self._refuted or self._refutation()
             self._start_over()
 
