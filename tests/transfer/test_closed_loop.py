@@ -202,6 +202,28 @@ def test_what_nothing_was_found_for_is_tried_again(monkeypatch: pytest.MonkeyPat
     assert loop.hypotheses.errors[0] <= weights[wrong].sum() / weights.sum() + 1e-9
 
 
+def test_structures_are_looked_for_again_once_enough_is_new(monkeypatch: pytest.MonkeyPatch):
+    loop = ERRAND.loop(patience=5)
+    due: list[tuple[int, int]] = []
+    looked: list[tuple[int, int]] = []
+    grow = ClosedLoop._grow
+
+    def recorded(self: ClosedLoop, good: int) -> None:
+        due.append((len(self.episodes), good))
+        grow(self, good)
+
+    monkeypatch.setattr(ClosedLoop, "_satisfying", property(lambda _: False))
+    monkeypatch.setattr(ClosedLoop, "_grow", recorded)
+    monkeypatch.setattr(ClosedLoop, "_start_over", lambda _: looked.append(due[-1]))
+    loop.learn(np.random.default_rng(100), 400)
+    expected = []
+    for episodes, good in due:
+        if good >= 5 and (not expected or episodes >= 1.25 * expected[-1][0] or good >= 1.25 * expected[-1][1]):
+            expected.append((episodes, good))
+    assert looked == expected
+    assert 3 < len(looked) < len(due)
+
+
 @pytest.mark.parametrize(("case", "form"), [(STAY, ModelBased()), (STAY, QLearning()), (ERRAND, QLearning())])
 def test_learning_in_two_parts_is_learning_at_once(case: Case, form: LearningForm):
     once, twice = (case.loop(3, form=form, patience=15) for _ in range(2))
