@@ -117,7 +117,7 @@ class ClosedLoop:
         self._guess: Learner | None = None
         self._judged: deque[bool] = deque(maxlen=settings.fresh)
         self._explored = self._failed = self._tried = 0
-        self._again = float(settings.patience), math.inf  # good ones or episodes before a structure is looked for
+        self._again = float(settings.patience), math.inf  # good episodes, or all, until a structure is due
         self._aside: Hypotheses | None = None  # what is gone back to where another structure turns out to be wrong
 
     @property
@@ -316,7 +316,7 @@ class ClosedLoop:
         return None
 
     def _most_promising(self, hypotheses: Hypotheses) -> SDNF | None:
-        """That of some hypotheses."""
+        """Of some hypotheses the one that could be satisfied most often; None if the formula acted on does as well."""
         formula = self.attempts[-1].formula
         others = self._some(hypotheses, 4 * self.settings.candidates)
         promises = {each: self._promise(each) for each in dict.fromkeys([formula, *others])}
